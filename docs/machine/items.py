@@ -8,19 +8,15 @@ from pathlib import Path
 from typing import Any
 
 from docs.machine.docstrings import first_line
-from docs.machine.formula import name as symbol
+from docs.machine.docstrings import name as symbol
 from docs.machine.markdown import TEXTS, block, code, contents, directive, opening, plain, table
-from symfric import ALL_LAWS, POPULATIONS, BrownMcPhee, law_name, parameters
+from symfric import ALL_LAWS, POPULATIONS, BrownMcPhee, Exact, Table, law_name, parameters
 from symfric.cli.laws import costs
 from symfric.figures.data import phenomena
 from symfric.foundation.parameters import options
-from symfric.laws import PHENOMENA, AnyLaw
-from symfric.laws.base.families import Exact
-from symfric.laws.composed.compose import Asymmetric, LoadDependent, Sum
-from symfric.laws.composed.isotropic import PlanarSlip, SpatialSlip
+from symfric.laws import PHENOMENA, AnyLaw, Asymmetric, LoadDependent, PlanarSlip, SpatialSlip, Sum
 from symfric.laws.composed.populations import cost
 from symfric.laws.composed.wrap import Lagged, LoadNormalised, TemperatureDependent
-from symfric.laws.static.coulomb import Table
 from symfric.scenes import ALL_SCENES, Scene
 
 MADE_OF_LAWS: dict[str, type[Any]] = {

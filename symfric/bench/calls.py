@@ -14,20 +14,15 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from symfric import Element, Model, Variable, prepare, simulate, stepper
 from symfric.bench.contenders import buffered, compiled, loop, tolerances
 from symfric.bench.report import Found, Progress, Report, backend, interleaved, unwarned
 from symfric.foundation.numeric import Array
 from symfric.foundation.programs import find_compiler
-from symfric.foundation.variable import Variable
 from symfric.integrator.by_peer import peer
 from symfric.integrator.equations.inputs import Hold, input_data
 from symfric.integrator.equations.system import system
-from symfric.integrator.prepared import prepare
-from symfric.integrator.simulate import simulate
-from symfric.integrator.stepper import stepper
 from symfric.laws import GMS, BrownMcPhee, ExactCoulomb, Law, LuGre, MaxwellSlip
-from symfric.laws.dynamic.maxwell_slip import Element
-from symfric.model import Model
 from symfric.scenes import Arm, Drive, Rabinowicz, contact
 
 Calls = dict[str, Callable[[], object]]

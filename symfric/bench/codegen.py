@@ -13,7 +13,7 @@ from typing import final
 
 import numpy as np
 
-from symfric import BrownMcPhee, ExactCoulomb, Hold, Law, LuGre, SolveError, simulate
+from symfric import BrownMcPhee, Element, ExactCoulomb, Hold, Law, LuGre, SolveError, simulate
 from symfric.bench.embedded import CASES, whole
 from symfric.bench.report import Found, Progress, Report, Row, goal
 from symfric.codegen import Block, law_block, plant_block
@@ -30,14 +30,12 @@ from symfric.compensation import (
 )
 from symfric.embedded import BY, Absent, find_tools, measure
 from symfric.emitter.c99 import REALS
-from symfric.fmu import Exported, export_fmu
-from symfric.fmu.export import running
+from symfric.fmu import Exported, export_fmu, running
 from symfric.foundation.numeric import Array
 from symfric.foundation.parameters import check_names
 from symfric.foundation.programs import CompileError, find_compiler
 from symfric.integrator import Input
 from symfric.laws import ALL_LAWS, GMS, ElastoPlastic
-from symfric.laws.dynamic.maxwell_slip import Element
 from symfric.scenes import ALL_SCENES, Drive, Rabinowicz, Scene, drive
 
 CORES = (

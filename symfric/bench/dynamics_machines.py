@@ -8,14 +8,11 @@ from typing import final
 import casadi as ca
 import numpy as np
 
+from symfric import Model, SolveError, Variable, simulate
 from symfric.bench.report import Found
 from symfric.dynamics import PeriodicOrbit, periodic_orbit
-from symfric.foundation.parameters import Variable
-from symfric.foundation.status import SolveError
-from symfric.integrator.equations.inputs import Input
-from symfric.integrator.simulate import simulate
+from symfric.integrator import Input
 from symfric.laws import BrownMcPhee, ExactCoulomb, Law, LuGre, Stribeck
-from symfric.model import Model
 from symfric.multibody import JointSpringDamper
 from symfric.scenes import CoupledBlocks, SliderCrank, contact, rabinowicz
 

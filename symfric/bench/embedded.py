@@ -12,8 +12,7 @@ from symfric.bench.report import Found, Progress, Report
 from symfric.codegen import Block, generate, inverse_dynamics_block, law_block, plant_block
 from symfric.embedded import CORES, Absent, Tools, find_tools, measure, wrong_on_target
 from symfric.embedded.measure import REGIMES
-from symfric.laws import GMS, BrownMcPhee, LuGre, MaxwellSlip, VelocityBased
-from symfric.laws.dynamic.maxwell_slip import Element
+from symfric.laws import GMS, BrownMcPhee, Element, LuGre, MaxwellSlip, VelocityBased
 from symfric.scenes import Arm, drive, rabinowicz
 
 TEN = tuple(Element(5e4 * 2.0**-i, 0.1) for i in range(10))

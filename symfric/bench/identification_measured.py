@@ -11,20 +11,11 @@ from typing import Any, final
 
 import numpy as np
 
-from identification.data.dataset import Dataset
-from identification.data.record import Record
-from identification.fit import Fit
-from identification.residuals.closed_loop import ClosedLoop
+from identification import ClosedLoop, Dataset, Fit, Fitted, Points, Record, Shooting
 from identification.residuals.initial import local, noise_of
-from identification.residuals.points import Points
-from identification.residuals.shooting import Shooting
 from identification.residuals.shots import sampled_motion
-from identification.result.fitted import Fitted
-from symfric import GMS, Element, LuGre
+from symfric import GMS, Element, Law, LuGre, Model, SolveError
 from symfric.bench.report import Found, Row, best_time, goal, timed
-from symfric.foundation.status import SolveError
-from symfric.laws import Law
-from symfric.model import Model
 
 DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
 EMPS = DATA / "EMPS"

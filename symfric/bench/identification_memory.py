@@ -6,20 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from identification.data.dataset import Dataset
-from identification.fit import Fit
-from identification.residuals.points import Points
-from identification.residuals.shooting import Shooting
-from identification.result.fitted import Fitted
+from identification import Dataset, Fit, Fitted, Measured, Points, Shooting, fit_elements
 from identification.select import Ranking, select
-from identification.starts.maxwell_slip import fit_elements
-from identification.starts.measured import Measured
-from symfric import GMS, Element, MaxwellSlip, Slider
+from symfric import GMS, Element, Hold, Law, LuGre, MaxwellSlip, Slider, Status, simulate
 from symfric.bench.report import Found, goal, timed
 from symfric.foundation.numeric import Array
-from symfric.foundation.status import Status
-from symfric.integrator import Hold, simulate
-from symfric.laws import Law, LuGre
 from symfric.scenes import Drive
 
 TRUTH = {

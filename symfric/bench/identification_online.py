@@ -8,7 +8,7 @@ from typing import Any, final
 import numpy as np
 
 from ocp import estimate
-from symfric import Law, drive
+from symfric import ElastoPlastic, Law, LuGre, Stribeck, drive
 from symfric.bench.report import Found, goal, timed
 from symfric.compensation import (
     Cascade,
@@ -22,7 +22,6 @@ from symfric.compensation import (
     sine,
 )
 from symfric.foundation.numeric import Array
-from symfric.laws import ElastoPlastic, LuGre, Stribeck
 
 SEEDS, SHORT = 50, 0.5
 """Number of loops, and length of those that run in C and in the VM [s]."""

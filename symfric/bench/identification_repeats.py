@@ -1,32 +1,21 @@
 """Repeated fits: with a noisy velocity, and from distant starts."""
 
 from collections.abc import Iterator, Mapping
-from functools import cache, partial
+from functools import partial
 
 import casadi as ca
 import numpy as np
 
-from identification.data.dataset import Dataset
-from identification.fit import Fit
-from identification.residuals.shooting import Shooting
-from identification.result.fitted import Fitted
-from symfric import law_from_text
+from identification import Dataset, Fit, Fitted, Shooting
+from symfric import Linear, Model, QuarterCarGeneral, QuarterCarSimple, Variable, simulate
+from symfric.bench.identification_verdicts import BLOCK, COULOMB_LAW, T, U, block, simulated
 from symfric.bench.report import Found, goal, timed
 from symfric.foundation.numeric import Array
-from symfric.foundation.parameters import Variable
-from symfric.integrator import Linear, Trajectory, simulate
-from symfric.laws import QuarterCarGeneral, QuarterCarSimple
-from symfric.model import Model
-from symfric.scenes import Drive, QuarterCar
+from symfric.scenes import QuarterCar
 
 SEEDS, QUICK = 100, 1
-BLOCK = {"m": 2.0, "mu_d": 1.0, "sigma_2": 0.8}
-"""True parameters of the simulated motion."""
 POSITION, VELOCITY = 1e-4, 0.2
 """Standard deviations of the noise [m, m/s]."""
-COULOMB = "coulomb+viscous"
-T = np.linspace(0.0, 4.0, 201)
-U = 3 * np.sin(2 * np.pi * 0.7 * T) + 2 * np.sin(2 * np.pi * 1.9 * T + 1)
 
 
 def velocity(quick: bool) -> Iterator[Found]:
@@ -44,23 +33,13 @@ def _added(seeds: int) -> float:
     true = np.array(list(BLOCK.values()))
     for seed in range(seeds):
         noise = np.random.default_rng(seed)
-        x = _motion()["x"] + POSITION * noise.standard_normal(T.size)
-        v = _motion()["v"] + VELOCITY * noise.standard_normal(T.size)
+        run = simulated(COULOMB_LAW)
+        x = run["x"] + POSITION * noise.standard_normal(T.size)
+        v = run["v"] + VELOCITY * noise.standard_normal(T.size)
         for name, fit in (("x", _fit_block(x=x)), ("x and v", _fit_block(x=x, v=v))):
             off[name].append(np.array([fit.values[p] for p in BLOCK]) - true)
     alone, both = (np.sqrt(np.mean(np.square(some), axis=0)) for some in off.values())
     return float(np.max(both / alone))
-
-
-def _drive() -> Model:
-    return Drive(law_from_text(COULOMB), m=BLOCK["m"], N=1.0).model(free=list(BLOCK))
-
-
-@cache
-def _motion() -> Trajectory:
-    """Return the motion of the block without noise."""
-    u, x0 = {"force": Linear(T, U)}, {"x": 0.0, "v": 0.0}
-    return simulate(_drive(), 4.0, p=BLOCK, t_eval=T, u=u, x0=x0, rtol=1e-9)
 
 
 def _fit_block(**signals: Array) -> Fitted:
@@ -68,7 +47,7 @@ def _fit_block(**signals: Array) -> Fitted:
     given = {"force": U, **signals}
     data = Dataset.of({"t": T, **given}, units={n: units[n] for n in given})
     start = {"m": 1.7, "mu_d": 0.8, "sigma_2": 1.0}
-    return Fit(Shooting(), _drive(), data, start=start).solve(throw=False)
+    return Fit(Shooting(), block(COULOMB_LAW), data, start=start).solve(throw=False)
 
 
 # ---- distant starts ----

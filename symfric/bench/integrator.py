@@ -7,6 +7,7 @@ from time import process_time
 
 import numpy as np
 
+from symfric import BrownMcPhee, Law, LuGre, Model, Trajectory, rabinowicz, simulate
 from symfric.bench import contenders
 from symfric.bench.contenders import Contender
 from symfric.bench.report import (
@@ -21,11 +22,6 @@ from symfric.bench.report import (
 )
 from symfric.foundation.numeric import Array
 from symfric.foundation.programs import find_compiler
-from symfric.integrator.simulate import simulate
-from symfric.laws import BrownMcPhee, Law, LuGre
-from symfric.model import Model
-from symfric.results.trajectory import Trajectory
-from symfric.scenes import rabinowicz
 
 T_END = 20.0
 TIMES = np.linspace(0.0, T_END, 401)[1:]

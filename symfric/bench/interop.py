@@ -21,12 +21,10 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from symfric import Hold, Model, drive, flow, rabinowicz, simulate
 from symfric.bench.report import Found, Progress, Report, Row, timed
 from symfric.foundation.numeric import Array
-from symfric.integrator import Hold, flow, simulate
 from symfric.laws import GMS, BrownMcPhee, ElastoPlastic, Law, LuGre
-from symfric.model import Model
-from symfric.scenes import drive, rabinowicz
 
 GOAL, T, N, LIMIT, LOAD = 0.1, 1.0, 50, 20.0, 10.0
 STEPS = 10

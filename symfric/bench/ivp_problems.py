@@ -1,4 +1,4 @@
-"""Initial-value problems with published solutions; see also `ivp_mechanisms`."""
+"""Initial-value problems with published solutions; see also `ivp`."""
 
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
@@ -9,8 +9,7 @@ from typing import Any, final
 import casadi as ca
 import numpy as np
 
-from symfric.foundation.parameters import Variable
-from symfric.model import Model
+from symfric import Model, Variable
 
 TEST_SET = (
     "Mazzia and Magherini, Test Set for Initial Value Problem Solvers, release 2.4, "

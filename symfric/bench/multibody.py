@@ -10,27 +10,16 @@ from typing import final
 import casadi as ca
 import numpy as np
 
+from symfric import BrownMcPhee, Law, Model, Viscous, simulate
 from symfric.bench.contenders import MECHANISMS, Array, Contender
-from symfric.bench.report import (
-    Found,
-    Progress,
-    Report,
-    Row,
-    best_time,
-    curves,
-    ratios,
-    unwarned,
-)
+from symfric.bench.report import Found, Progress, Report, Row, best_time, curves, ratios, unwarned
 from symfric.foundation.numeric import bound
 from symfric.foundation.programs import find_compiler
 from symfric.integrator.equations.initial import consistent, first_guess
 from symfric.integrator.equations.inputs import input_data
+from symfric.integrator.methods.attempt import Given, State
 from symfric.integrator.methods.tableaux import METHODS
 from symfric.integrator.running.integrator import Integrator
-from symfric.integrator.simulate import simulate
-from symfric.integrator.step.attempt import Given, State
-from symfric.laws import BrownMcPhee, Law, Viscous
-from symfric.model import Model
 from symfric.multibody import JointFriction, Mechanism, Revolute
 from symfric.scenes import DoublePendulum, FourMass, MechanismScene, PendulumBox, SliderCrank
 

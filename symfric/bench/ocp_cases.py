@@ -16,14 +16,9 @@ from typing import Any, final
 
 import casadi as ca
 
-from ocp.formulation.expressions import at_end, integral
-from ocp.formulation.phase import Chain, Phase
-from ocp.formulation.problem import Problem
+from ocp import Chain, Phase, Problem, at_end, integral
 from ocp.problems import GRAVITY, READY
-from symfric.foundation.parameters import Variable
-from symfric.laws import BrownMcPhee
-from symfric.model import Model
-from symfric.model.contact import Contact
+from symfric import BrownMcPhee, Contact, Model, Variable
 
 Box = tuple[float, float]
 Rate = Callable[[Any, Sequence[Any], Any, Sequence[Any]], list[Any]]

@@ -15,9 +15,7 @@ from typing import Any, final
 import casadi as ca
 import numpy as np
 
-from ocp.formulation.problem import Problem
-from ocp.solve import solve
-from ocp.solving.solution import Solution
+from ocp import Problem, Solution, solve
 from symfric.bench.ocp_cases import UNBOUNDED, Case
 from symfric.foundation.numeric import Array
 from symfric.foundation.status import Status

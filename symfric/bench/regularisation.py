@@ -24,6 +24,7 @@ from typing import final
 
 import numpy as np
 
+from symfric import Trajectory, parameters, with_values
 from symfric.bench.report import Found, Progress, Report, backend, curves
 from symfric.figures.regularisation import (
     Machine,
@@ -34,7 +35,6 @@ from symfric.figures.regularisation import (
     sample,
 )
 from symfric.foundation.numeric import Array
-from symfric.foundation.parameters import parameters, with_values
 from symfric.laws import (
     BrownMcPhee,
     Coulomb,
@@ -44,7 +44,6 @@ from symfric.laws import (
     LuGreNormalised,
     steady_force,
 )
-from symfric.results.trajectory import Trajectory
 from symfric.scenes import FourMass, PendulumBox, Rabinowicz, Scene, SliderCrank
 
 RTOLS = (1e-5, 1e-6, 1e-8)

@@ -11,10 +11,9 @@ from statistics import median
 
 import numpy as np
 
+from ocp import Problem, Solution
 from ocp.formulation.phase import Span, clipped, limits
-from ocp.formulation.problem import Problem
 from ocp.problems import READY, Ready
-from ocp.solving.solution import Solution
 from ocp.solving.starts import initial_points
 from ocp.transcription.schemes import Radau, make_meshes
 from ocp.transcription.transcribe import discretise

@@ -8,33 +8,11 @@ from typing import final
 import numpy as np
 from scipy.optimize import brentq
 
+from symfric import laws
 from symfric.foundation import checks
 from symfric.foundation.numeric import Array
 from symfric.foundation.parameters import parameters, with_values
-from symfric.laws import (
-    Armstrong,
-    BengisuAkay,
-    Benson,
-    Bittencourt,
-    BlimanSorine,
-    DuanSingh,
-    ExactCoulomb,
-    Exudyn,
-    Law,
-    Leuven,
-    MakkarDixon,
-    MaxwellSlip,
-    MixedLubrication,
-    Network,
-    PoppStelter,
-    QuarterCarSimple,
-    RuiWang,
-    Spline,
-    SteadyStateLuGre,
-    StickSlip,
-    VelocityBased,
-    steady_force,
-)
+from symfric.laws import Law, steady_force
 
 
 @final
@@ -63,11 +41,11 @@ class Friction:
             checks.number("friction: v_s", self.v_s, unit="m/s", above=0.0)
 
     @property
-    def exact(self) -> ExactCoulomb:
+    def exact(self) -> laws.ExactCoulomb:
         """Law of this friction without regularisation."""
         if self.v_s is None:
-            return ExactCoulomb(mu_s=self.mu_s, mu_d=self.mu_d)
-        return ExactCoulomb(mu_s=self.mu_s, mu_d=self.mu_d, v_s=self.v_s, form="stribeck")
+            return laws.ExactCoulomb(mu_s=self.mu_s, mu_d=self.mu_d)
+        return laws.ExactCoulomb(mu_s=self.mu_s, mu_d=self.mu_d, v_s=self.v_s, form="stribeck")
 
     def sliding(self, speed: float) -> float:
         """Return the friction coefficient in steady sliding at a speed > 0 [m/s]."""
@@ -92,15 +70,15 @@ def friction_of(law: Law) -> Friction:
 
 
 FALL: dict[type[Law], str] = {
-    BengisuAkay: "xi",
-    Exudyn: "v_exp",
-    Benson: "d_c",
-    DuanSingh: "c",
-    PoppStelter: "d",
-    MakkarDixon: "gamma_3",
+    laws.BengisuAkay: "xi",
+    laws.Exudyn: "v_exp",
+    laws.Benson: "d_c",
+    laws.DuanSingh: "c",
+    laws.PoppStelter: "d",
+    laws.MakkarDixon: "gamma_3",
 }
 """Names of the Stribeck velocity, or of its inverse, by law, if it is not v_s."""
-NO_FALL = (VelocityBased, StickSlip)
+NO_FALL = (laws.VelocityBased, laws.StickSlip)
 """Laws in which v_s is the width of the transition and not a Stribeck velocity."""
 
 
@@ -121,13 +99,13 @@ def _of_bliman(f: Friction, _: float) -> Mapping[str, float]:
         return {"mu_1": f.mu_d, "mu_2": 0.0}
 
     def missing(mu_2: float) -> float:
-        return float(BlimanSorine(f.mu_d + mu_2, mu_2).static_level(1.0)) - f.mu_s  # pyright: ignore[reportArgumentType]
+        return float(laws.BlimanSorine(f.mu_d + mu_2, mu_2).static_level(1.0)) - f.mu_s  # pyright: ignore[reportArgumentType]
 
     mu_2 = float(brentq(missing, 1e-6 * f.mu_d, 1e6 * f.mu_d))  # pyright: ignore[reportArgumentType]
     return {"mu_1": f.mu_d + mu_2, "mu_2": mu_2}
 
 
-def _shared(law: type[MaxwellSlip | Leuven], total: str) -> Levels:
+def _shared(law: type[laws.MaxwellSlip | laws.Leuven], total: str) -> Levels:
     """Return the levels of the default elements, scaled such that together they carry `total`."""
     mu = {n: p.value for n, p in parameters(law()).items() if n[:3] == "mu_" and n[3:].isdigit()}
     least = getattr(law(), "mu_s", sum(mu.values()))  # elements of Leuven carry more than mu_s
@@ -135,23 +113,25 @@ def _shared(law: type[MaxwellSlip | Leuven], total: str) -> Levels:
 
 
 LEVELS: dict[type[Law], Levels] = {
-    Bittencourt: lambda f, _: {
+    laws.Bittencourt: lambda f, _: {
         "F_cl": f.mu_d,
         "F_sl": f.mu_s - f.mu_d,
         **dict.fromkeys(("F_c0", "F_s0", "F_sT", "F_v0", "F_vT"), 0.0),
     },
-    QuarterCarSimple: lambda f, N: {"C_e": f.mu_s * N, "sigma_v": 0.0},
-    PoppStelter: lambda f, _: {"eta": f.mu_d / f.mu_s},
-    Armstrong: lambda f, _: {"mu_inf": f.mu_s - f.mu_d, "mu_a": 0.2 * (f.mu_s - f.mu_d)},
-    BlimanSorine: _of_bliman,
-    MaxwellSlip: _shared(MaxwellSlip, "mu_d"),
-    Leuven: _shared(Leuven, "mu_s"),
-    SteadyStateLuGre: lambda f, N: {"F_S": f.mu_s * N, "F_C": f.mu_d * N, "sigma_2": 0.0},
-    RuiWang: lambda f, N: {"D": f.mu_s * N, "C": 2 - 2 / pi * asin(f.mu_d / f.mu_s)},
-    Spline: lambda f, _: {n: f.mu_d for n in parameters(Spline()) if n[:2] == "c_"},
-    Network: lambda f, _: {n: 0.0 for n in parameters(Network()) if n[:2] == "w_"} | {"b": f.mu_d},
-    MixedLubrication: lambda f, _: {"mu_b": f.mu_d, "eta": 0.0},
-    MakkarDixon: lambda f, N: {"gamma_1": (f.mu_s - f.mu_d) * N, "gamma_4": f.mu_d * N},
+    laws.QuarterCarSimple: lambda f, N: {"C_e": f.mu_s * N, "sigma_v": 0.0},
+    laws.PoppStelter: lambda f, _: {"eta": f.mu_d / f.mu_s},
+    laws.Armstrong: lambda f, _: {"mu_inf": f.mu_s - f.mu_d, "mu_a": 0.2 * (f.mu_s - f.mu_d)},
+    laws.BlimanSorine: _of_bliman,
+    laws.MaxwellSlip: _shared(laws.MaxwellSlip, "mu_d"),
+    laws.Leuven: _shared(laws.Leuven, "mu_s"),
+    laws.SteadyStateLuGre: lambda f, N: {"F_S": f.mu_s * N, "F_C": f.mu_d * N, "sigma_2": 0.0},
+    laws.RuiWang: lambda f, N: {"D": f.mu_s * N, "C": 2 - 2 / pi * asin(f.mu_d / f.mu_s)},
+    laws.Spline: lambda f, _: {n: f.mu_d for n in parameters(laws.Spline()) if n[:2] == "c_"},
+    laws.Network: lambda f, _: (
+        {n: 0.0 for n in parameters(laws.Network()) if n[:2] == "w_"} | {"b": f.mu_d}
+    ),
+    laws.MixedLubrication: lambda f, _: {"mu_b": f.mu_d, "eta": 0.0},
+    laws.MakkarDixon: lambda f, N: {"gamma_1": (f.mu_s - f.mu_d) * N, "gamma_4": f.mu_d * N},
 }
 """Functions (friction, load) -> levels by law, for laws whose levels are not mu_s and mu_d."""
 
@@ -226,12 +206,12 @@ def _top(law: Law, v: Array, N: float) -> float:
 def _raised(law: Law, factor: float, missing: float, N: float, v: Array) -> dict[str, float]:
     """Return parameters that raise the peak by a `factor`, or by the coefficient `missing`."""
     now = {name: float(p.value) for name, p in parameters(law).items()}
-    if isinstance(law, MakkarDixon):  # the excess of the peak is a share of gamma_1
+    if isinstance(law, laws.MakkarDixon):  # the excess of the peak is a share of gamma_1
         share = float((np.tanh(now["gamma_2"] * v) - np.tanh(now["gamma_3"] * v)).max())
         return {"gamma_1": now["gamma_1"] + missing * N / share}
-    if isinstance(law, Bittencourt):
+    if isinstance(law, laws.Bittencourt):
         return {"F_sl": now["F_sl"] + missing}
-    if isinstance(law, PoppStelter):
+    if isinstance(law, laws.PoppStelter):
         return {"mu_s": now["mu_s"] * factor, "eta": now["eta"] / factor}
-    name = "F_S" if isinstance(law, SteadyStateLuGre) else "mu_s"
+    name = "F_S" if isinstance(law, laws.SteadyStateLuGre) else "mu_s"
     return {name: now[name] * factor}

@@ -10,21 +10,8 @@ from typing import final
 import casadi as ca
 import numpy as np
 
-from symfric.choice import nature
-from symfric.choice.continuation import (
-    EFFORT,
-    FINEST,
-    LEAST,
-    RUN,
-    AtEqualError,
-    Budget,
-    Wanted,
-    at_equal_error,
-    continued,
-    counted,
-    nearest,
-    short,
-)
+from symfric.choice import continuation, nature
+from symfric.choice.continuation import AtEqualError, Budget, Wanted, at_equal_error, short
 from symfric.choice.friction import Friction
 from symfric.choice.machine import FAILURES, OWN, Candidate, Reference, candidate, quiet_run
 from symfric.choice.nature import lacking
@@ -169,7 +156,7 @@ class Task:
     control: float
     own: bool
     fixed: bool
-    work: int = RUN
+    work: int = continuation.RUN
     misfits: dict[str, float] | None = None
 
     @property
@@ -204,7 +191,7 @@ def measured(task: Task, name: str, law: Law) -> Row:
     for bristles in OF_BRISTLES if law.states else OF_BRISTLES[:1]:
         try:
             held = candidate(task.machine, law, task.frictions, task.load, task.own, bristles)
-            instructions, _ = counted(task.machine, held.first, task.goal.coarse)
+            instructions, _ = continuation.counted(task.machine, held.first, task.goal.coarse)
         except FAILURES as problem:
             text = short(problem)
             _, lacks, inputs = text.partition("got one that needs ")
@@ -213,13 +200,13 @@ def measured(task: Task, name: str, law: Law) -> Row:
         runs, found = Budget(held, instructions, task.work), SmoothingStudy((), "")
         try:
             task = _from_own(task, held, runs)
-            found = continued(runs, task.reference, task.goal)
+            found = continuation.continued(runs, task.reference, task.goal)
             placed = _placed(task, held, found, runs, row)
             tried.append((replace(placed, spent=not runs.left()), held, found))
         except FAILURES as problem:
             failed = replace(row, standing=FAILED, reason=short(problem))
             tried.append((failed, held, found))
-        open_ended = not found.decided and EFFORT not in found.stopped
+        open_ended = not found.decided and continuation.EFFORT not in found.stopped
         if tried[-1][0].standing not in (INACCURATE, FAILED) or not open_ended:
             break
     row, held, found = min(tried, key=lambda each: place(each[0]))
@@ -261,7 +248,7 @@ def _placed(task: Task, held: Candidate, levels: SmoothingStudy, runs: Budget, r
     curve = tuple(
         (level.error, float(level.attempts * runs.instructions)) for level in levels.levels
     )
-    counts, method = counted(task.machine, at.model, at.rtol)
+    counts, method = continuation.counted(task.machine, at.model, at.rtol)
     law = held.law_at(at.s)
     row = replace(
         row, curve=curve, error=at.error, own_error=at.own, smoothing=at.s, rtol=at.rtol,
@@ -297,7 +284,7 @@ def _judged(task: Task, levels: SmoothingStudy, runs: Budget) -> AtEqualError:
                     return at
         off = tuple(level for level in levels.levels if level.error > task.accuracy)
         levels = replace(levels, levels=off or levels.levels[:1])
-    near = nearest(levels)
+    near = continuation.nearest(levels)
     return at_equal_error(runs, near.s, task.reference, task.goal, near, whole=False)
 
 
@@ -306,7 +293,7 @@ def _holds(task: Task, at: AtEqualError, runs: Budget) -> bool:
 
     Runs of stiff bristles may fail this test because of rounding errors.
     """
-    tighter = max(TIGHTER * at.rtol, FINEST)
+    tighter = max(TIGHTER * at.rtol, continuation.FINEST)
     if not runs.held.law.states or tighter >= at.rtol:
         return True
     try:
@@ -344,7 +331,7 @@ def _stepped(task: Task, held: Candidate, levels: SmoothingStudy, row: Row) -> R
     try:
         model, law = held.model(s or row.smoothing), held.law_at(s or row.smoothing)
         machine = replace(task.machine, of=None, times=None)
-        most = max(LEAST, task.work // row.instructions)
+        most = max(continuation.LEAST, task.work // row.instructions)
         run = quiet_run(machine, model, law, row.rtol if s is None else task.goal.fine, most)
     except FAILURES as problem:
         return replace(row, fixed_why=short(problem), explicit_why=short(problem))

@@ -20,10 +20,9 @@ from symfric.figures.regularisation import Measure, machine_of
 from symfric.foundation import checks
 from symfric.foundation.files import write_table, write_text
 from symfric.foundation.workers import Crashed, outcomes
-from symfric.integrator.equations.inputs import Input
+from symfric.integrator import Input, Trajectory
 from symfric.laws import ALL_LAWS, BrownMcPhee, Law, law_name
 from symfric.laws.base.law import require_law
-from symfric.results.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

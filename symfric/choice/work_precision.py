@@ -19,12 +19,9 @@ from symfric.foundation.files import write_table
 from symfric.foundation.programs import find_compiler
 from symfric.foundation.shown import Showing, Shown, Table, among
 from symfric.foundation.status import SolveError, Status
-from symfric.integrator.arguments import check_model
-from symfric.integrator.equations.inputs import Input
+from symfric.integrator import Input, Trajectory, simulate
 from symfric.integrator.methods.tableaux import ADAPTIVE
-from symfric.integrator.simulate import simulate
-from symfric.model import Model
-from symfric.results.trajectory import Trajectory
+from symfric.model import Model, check_model
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

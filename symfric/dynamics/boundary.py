@@ -14,16 +14,13 @@ from typing import TYPE_CHECKING, cast, final
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.dynamics.balance import rows_at_rest
 from symfric.dynamics.branch import Branch, Special
 from symfric.dynamics.continuation import checked_span
 from symfric.dynamics.curve import Equations as Curve
 from symfric.dynamics.curve import Node, at_edge, corrected, followed
 from symfric.dynamics.curve import tangent as direction
-from symfric.dynamics.equations import equations
-from symfric.dynamics.families import TINY, Equilibria
-from symfric.dynamics.tangent import tangent
-from symfric.dynamics.trace import REAL
+from symfric.dynamics.equations import equations, tangent
+from symfric.dynamics.families import REAL, TINY, Equilibria
 from symfric.foundation import checks
 from symfric.foundation.numeric import Array
 from symfric.foundation.parameters import check_names
@@ -67,11 +64,16 @@ class Boundary(Showing):
         Args:
             path: image file.
         """
-        from symfric.dynamics.pictures import boundary_line  # noqa: PLC0415  (slow to import)
+        from symfric.foundation.panels import NARROW, panels, save  # noqa: PLC0415  (slow to import)
+        from symfric.foundation.style import line  # noqa: PLC0415  (slow to import)
 
         units = {v.name: v.unit for v in self.model.p}
         first, second = (f"{name} [{units[name]}]" for name in self.parameters)
-        return boundary_line(self.values[:, 1], self.values[:, 0], (second, first), self.kind, path)
+        figure, (axis,) = panels(1, width=NARROW, height=3.0)
+        axis.plot(*self.values.T[::-1], linewidth=1.6, label=self.kind, **line(0))
+        axis.set(xlabel=second, ylabel=first)
+        axis.legend(frameon=False, fontsize="small")
+        return save(figure, path)
 
     def shown(self) -> Shown:
         """Return the ranges of both parameters."""
@@ -90,20 +92,13 @@ class Points(Curve):
     """Equations of a boundary; z = (y, first parameter, second parameter)."""
 
     rest: Equilibria
-    second: int
     hopf: bool
     scale: Array
     tolerance: float
 
-    def split(self, z: Array) -> tuple[Array, Array]:
-        """Return the unknowns of the equilibrium, and inputs and parameters."""
-        d = self.rest.d.copy()
-        d[[self.rest.index, self.second]] = z[-2:]
-        return z[:-2], d
-
     def critical(self, z: Array) -> complex:
         """Return the eigenvalue next to the imaginary axis, relative to the largest one [1/s]."""
-        A = tangent(self.rest.eq, *self.split(z)).A
+        A = tangent(self.rest.eq, *self.rest.split(z)).A
         found: NDArray[np.complex128] = np.linalg.eigvals(A).astype(complex)
         size = float(np.abs(found).max(initial=TINY))
         other = (found.imag > REAL * size) != self.hopf
@@ -118,22 +113,13 @@ class Points(Curve):
 
     def at(self, z: Array) -> Node:
         """Return the linearised equations; see `Curve.at`."""
-        eq, (y, d) = self.rest.eq, self.split(z)
-        modes = y[[mode for _, mode in eq.switching]]
-        if (modes * eq.sliding(y, d).full().ravel() < 0).any():
-            raise ValueError("a sliding contact comes to rest")
-        r, slopes = rows_at_rest(eq, y, d)
-        own = np.setdiff1d(np.arange(y.size), np.union1d(eq.modes, eq.cyclic))
-        chosen = np.array([*own, y.size, y.size + 1])
-        columns = np.array([*own, y.size + self.rest.index, y.size + self.second])
-        size = np.maximum((np.abs(slopes[:, columns]) * self.scale[chosen]).max(axis=1), TINY)
-        D, h = np.eye(z.size)[:, chosen], CHANGE * self.scale[chosen]
+        node = self.rest.at(z)
         row = [
             (self.growth(z + a * e) - self.growth(z - a * e)) / (2 * a)
-            for a, e in zip(h, D.T, strict=True)
+            for a, e in zip(CHANGE * self.scale[node.chosen], node.D.T, strict=True)
         ]
-        J = np.vstack([slopes[:, columns] / size[:, None], row])
-        return Node(z, np.append(r / size, self.growth(z)), J, chosen, D, None)
+        r, J = np.append(node.r, self.growth(z)), np.vstack([node.J, row])
+        return node._replace(r=r, J=J)
 
 
 def boundary(
@@ -215,9 +201,9 @@ def _start(
     reach, width = max(float(np.ptp(branch.values)), TINY), span[1] - span[0]
     d = np.concatenate([model.values("u", cast("dict[str, float]", u)), model.values("p", p)])
     first, second = order.index(branch.parameter), order.index(parameter)
-    rest = Equilibria(eq, d, first, np.append(scale, reach), 1e-11)
     every = np.concatenate([scale, [reach, width]])
-    curve = Points(rest, second, special.kind == "Hopf", every, 1e-10)
+    rest = Equilibria(eq, d, (first, second), every, 1e-11)
+    curve = Points(rest, special.kind == "Hopf", every, 1e-10)
     z = np.concatenate([y, [special.value, p[parameter]]])
     return curve, corrected(curve, z, np.eye(z.size)[-1])[0]
 
@@ -226,11 +212,8 @@ def _within(
     curve: Points, node: Node, tau: Array, span: tuple[float, float], step: float, points: int
 ) -> Iterator[Node]:
     """Yield the nodes of a curve up to the end of the range of the second parameter."""
-
-    def any_node(_: Node, __: Node) -> None:
-        return
-
-    for k, found in enumerate(followed(curve, node, tau, step, any_node, lambda _: np.inf)):
+    steps = followed(curve, node, tau, step, lambda _, __: None, lambda _: np.inf)
+    for k, found in enumerate(steps):
         end = at_edge(curve, found, span)
         yield end or found.node
         if end or k + 2 > points:

@@ -14,9 +14,8 @@ from symfric.foundation import checks
 from symfric.foundation.numeric import Array
 from symfric.foundation.parameters import check_names
 from symfric.foundation.shown import Showing, Shown, Table
-from symfric.integrator.equations.inputs import Input
+from symfric.integrator import Ensemble, Input
 from symfric.model import Model
-from symfric.results.ensemble import Ensemble
 from symfric.results.stored import Format
 
 if TYPE_CHECKING:

@@ -1,17 +1,17 @@
 """Continuation of equilibria and periodic orbits in a parameter, through folds and grazing."""
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from symfric.dynamics.branch import Branch, Special
 from symfric.dynamics.curve import Node, Step, at_edge, corrected, followed, tangent
 from symfric.dynamics.equilibrium import Equilibrium
-from symfric.dynamics.families import Equilibria, Orbits
+from symfric.dynamics.families import Equilibria, Family, Orbits, Trace
 from symfric.dynamics.orbit import PeriodicOrbit
 from symfric.dynamics.shooting import Shooting
 from symfric.dynamics.sticking import Near, restarted, same_sequence
-from symfric.dynamics.trace import Family, Point, Trace, kind_of, note, point, vanishing
 from symfric.foundation import checks
 from symfric.foundation.numeric import Array
 from symfric.foundation.parameters import check_names
@@ -171,24 +171,24 @@ def _equilibria(
     """Return the equations of equilibria through `start`, and the unknowns there."""
     eq, k = start.equations, [*start.u, *start.p].index(name)
     scale = np.append(np.maximum(eq.scale, np.abs(start.y)), span[1] - span[0])
-    return Equilibria(eq, start.data, k, scale, 1e-11), np.append(start.y, start.data[k])
+    return Equilibria(eq, start.data, (k,), scale, 1e-11), np.append(start.y, start.data[k])
 
 
 def _traced(
     curve: Family, node: Node, tau: Array, span: tuple[float, float], points: int, step: float
 ) -> Trace:
     """Return the part of the curve from `node` in the direction `tau`."""
-    trace = Trace([point(curve, node)])
+    trace = Trace([curve.point(node)])
     try:
         for found in _steps(curve, node, tau, span, step, trace):
-            note(curve, found, trace)
+            trace.locate(curve, found)
             if last := at_edge(curve, found, span):
                 if last is not found.node:
-                    trace.points.append(point(curve, last))
+                    trace.points.append(curve.point(last))
                 trace.message = "ends at the given range"
                 break
-            trace.points.append(point(curve, found.node))
-            if (value := vanishing(curve, trace.points)) is not None:
+            trace.points.append(curve.point(found.node))
+            if (value := curve.vanishing(trace.points)) is not None:
                 trace.add("Hopf", curve, found.node, value)
                 trace.message = "ends at a Hopf point"
                 break
@@ -204,12 +204,12 @@ def _steps(
     curve: Family, node: Node, tau: Array, span: tuple[float, float], step: float, trace: Trace
 ) -> Iterator[Step]:
     """Yield steps along the curve, also across changes of stick and slip."""
-    known = {kind_of(curve, node)}
+    known = {curve.kind_of(node)}
     while True:
         near = Near(curve)
         for found in followed(curve, node, tau, step, same_sequence, near.most):
             node, tau = found.node, found.tau
-            known.add(kind_of(curve, node))
+            known.add(curve.kind_of(node))
             yield found
         if isinstance(curve, Equilibria) and curve.turns(node.z + step * tau * curve.scale):
             trace.message = "ends where a sliding contact comes to rest"
@@ -218,8 +218,8 @@ def _steps(
         if other is None:
             return
         node, away = other
-        known.add(kind_of(curve, node))
-        trace.points.append(point(curve, node))
+        known.add(curve.kind_of(node))
+        trace.points.append(curve.point(node))
         tau = tangent(curve, node, away * _unit(node.z.size))
 
 
@@ -237,7 +237,7 @@ def _other(
         kind, value = near.boundary(node)
         trace.add(kind, curve, node, value)
         trace.message = f"ends where the sequence of stick and slip changes ({kind})"
-    other = restarted(curve, node, span, lambda new: kind_of(curve, new) not in known)
+    other = restarted(curve, node, span, lambda new: curve.kind_of(new) not in known)
     if other is not None and not curve.problem.eq.switching:
         trace.add("fold", curve, node)
         trace.rough("fold", float(node.z[-1]))
@@ -252,22 +252,14 @@ def _joined(
     back, on = parts
     points = [*reversed(back.points[1:]), *on.points]
     shift = max(len(back.points) - 1, 0)
-    special = [
-        Special(s.kind, s.value, shift + 1 - s.index, s.x, s.period, s.direction)
-        for s in reversed(back.special)
-    ]
-    special += [
-        Special(s.kind, s.value, shift + s.index, s.x, s.period, s.direction) for s in on.special
-    ]
-    width = max(pt.exponents.size for pt in points)
-    exponents = np.full((len(points), width, 2), np.nan)
-    for row, pt in zip(exponents, points, strict=True):
-        row[: pt.exponents.size] = np.column_stack([pt.exponents.real, pt.exponents.imag])
-    column = {n: np.array([getattr(pt, n) for pt in points]) for n in Point._fields[:3]}
+    special = [replace(s, index=shift + 1 - s.index) for s in reversed(back.special)]
+    special += [replace(s, index=shift + s.index) for s in on.special]
+    values, x, periods, exponents, low, high, sequences = zip(*points, strict=True)
+    parts_of = np.full((len(points), max(found.size for found in exponents), 2), np.nan)
+    for row, found in zip(parts_of, exponents, strict=True):
+        row[: found.size] = np.column_stack([found.real, found.imag])
     message = "; ".join(m for m in (back.message, on.message, *back.notes, *on.notes) if m)
     return Branch(
-        model, name, dict(u), dict(p), column["value"], column["x"], column["period"], exponents,
-        np.array([pt.low for pt in points]), np.array([pt.high for pt in points]),
-        tuple(pt.sequence for pt in points), tuple(special), message,
-        driven,
+        model, name, dict(u), dict(p), np.array(values), np.array(x), np.array(periods), parts_of,
+        np.array(low), np.array(high), sequences, tuple(special), message, driven,
     )  # fmt: skip

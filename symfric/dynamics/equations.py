@@ -12,15 +12,17 @@ example is the position of a drive that turns at constant speed.
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import final
+from typing import Any, NamedTuple, final
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import qr
 
 from symfric.foundation.numeric import Array
 from symfric.foundation.variable import stacked
 from symfric.integrator.equations.manifold import holonomic_columns
+from symfric.integrator.equations.matrices import null_space
 from symfric.integrator.equations.system import implicit_columns
 from symfric.model import Contact, Model
 from symfric.model.contact import APPLIED
@@ -149,17 +151,6 @@ class Equations:
         return ca.Function("expressed", [self.y, self.d], [ca.densify(expression)], {"cse": True})
 
     @cached_property
-    def bounds(self) -> ca.Function:
-        """Function (y, d) -> derivatives of constraints and slips by y."""
-        found = [ca.jacobian(part, self.y) for part in (self.constraints, self.slips)]
-        return ca.Function("bounds", [self.y, self.d], found)
-
-    @cached_property
-    def sliding(self) -> ca.Function:
-        """Function (y, d) -> slips."""
-        return ca.Function("sliding", [self.y, self.d], [ca.densify(self.slips)])
-
-    @cached_property
     def contacts(self) -> ca.Function:
         """Function (y, d) -> rows (slip, force, level against +F, level against -F), one each."""
         every = self.model.contacts
@@ -206,3 +197,64 @@ def _made(model: Model) -> Equations:
         mass = ca.diagcat(ca.SX.eye(len(model.x)), ca.SX(len(model.z), len(model.z)))
         names = [v.name for v in (*model.x, *model.z)]
     return Equations(model, y, f, ca.DM(mass).full(), tuple(names))
+
+
+class Tangent(NamedTuple):
+    """Linear equations e' = A e + B dd with dy = T e + Y dd.
+
+    Attributes:
+        states: indices of the independent states e in y, shape (k,).
+        A, B: shapes (k, k) and (k, n_d).
+        T, Y: shapes (n, k) and (n, n_d); T is the identity in the rows `states`.
+    """
+
+    states: Indices
+    A: Array
+    B: Array
+    T: Array
+    Y: Array
+
+
+def independent(C: Array, scale: Array, states: Indices) -> tuple[Indices, Array]:
+    """Return indices of independent states e, and T with C T = 0 and the identity in their rows.
+
+    Args:
+        C: derivatives of the conditions, shape (m, n).
+        scale: typical magnitudes of the unknowns, shape (n,).
+        states: indices of the unknowns among which e is selected.
+    """
+    rows = C * scale
+    size = np.maximum(np.abs(rows).max(axis=1, keepdims=True, initial=0.0), 1e-300)
+    _, s, V = np.linalg.svd(rows / size)
+    rank = int((s > DEPENDENT * s.max(initial=0.0)).sum())
+    N = scale[:, None] * V[rank:].T
+    share = N[states] / scale[states][:, None]
+    found: Any = qr(share.T, mode="economic", pivoting=True)
+    _, R, order = found
+    k = int((np.abs(np.diag(R)) > DEPENDENT).sum())
+    chosen = np.sort(np.asarray(states)[order[:k]]).astype(np.intp)
+    T = N @ np.linalg.pinv(N[chosen])
+    T[chosen] = np.eye(k)
+    return chosen, T
+
+
+def conditions(eq: Equations, y: Array, d: Array) -> tuple[Array, Array, Array]:
+    """Return C, and derivatives of f by y and by d, at y."""
+    J, of_C, of_slips, K, *_ = (slope.full() for slope in eq.slopes(y, d))
+    stuck = eq.stuck(y)
+    modes = np.eye(y.size)[eq.modes]
+    return np.vstack([J[eq.algebraic], of_C, of_slips[stuck], modes]), J, K
+
+
+def tangent(eq: Equations, y: Array, d: Array) -> Tangent:
+    """Return the linear equations at the equilibrium `y`."""
+    C, J, K = conditions(eq, y, d)
+    states = np.setdiff1d(np.arange(len(eq.model.x)), eq.modes)
+    chosen, T = independent(C, eq.scale, states)
+    rows, free, moving = eq.algebraic, null_space(eq.M), eq.differential
+    Y = -free @ np.linalg.solve(J[rows] @ free, K[rows])
+    E = eq.M[moving] @ T
+    right = np.hstack([J[moving] @ T, K[moving] + J[moving] @ Y])
+    size = (np.abs(eq.M[moving]) @ eq.scale)[:, None]
+    both: Array = np.linalg.lstsq(E / size, right / size, rcond=None)[0].astype(float)
+    return Tangent(chosen, both[:, : chosen.size], both[:, chosen.size :], T, Y)

@@ -10,8 +10,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from symfric.dynamics.balance import FORCE, SLIP, STILL, UP, Condition, settled, with_modes
-from symfric.dynamics.equations import Equations, equations
-from symfric.dynamics.tangent import Tangent, tangent
+from symfric.dynamics.equations import Equations, Tangent, equations, tangent
 from symfric.foundation.numeric import Array
 from symfric.foundation.parameters import check_names
 from symfric.foundation.shown import Showing, Shown, Table

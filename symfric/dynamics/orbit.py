@@ -9,20 +9,16 @@ from typing import TYPE_CHECKING, Any, final
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.dynamics.driving import check_period
 from symfric.dynamics.equilibrium import Equilibrium
 from symfric.dynamics.linear import linearize
-from symfric.dynamics.newton import CLOSED, solved
-from symfric.dynamics.shooting import METHOD, Linear, Shooting
+from symfric.dynamics.shooting import CLOSED, METHOD, Linear, Shooting, check_period, solved
 from symfric.foundation import checks
 from symfric.foundation.numeric import Array
 from symfric.foundation.shown import Showing, Shown, Table
-from symfric.integrator.equations.inputs import Input
-from symfric.integrator.simulate import simulate
+from symfric.integrator import Input, Trajectory, simulate
 from symfric.model import Model, check_model
 from symfric.model.kinds import MODE
 from symfric.results.sections import Cycle
-from symfric.results.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

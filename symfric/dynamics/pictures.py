@@ -69,25 +69,6 @@ def portrait(run: Trajectory, x: str, y: str, path: str | Path | None) -> Figure
     return save(figure, path)
 
 
-def boundary_line(
-    x: Array, y: Array, labels: tuple[str, str], name: str, path: str | Path | None
-) -> Figure:
-    """Plot a curve of special points in the plane of two parameters.
-
-    Args:
-        x, y: values of the parameters, shape (n,).
-        labels: of both axes.
-        name: kind of the points.
-        path: image file.
-    """
-    figure, (axis,) = panels(1, width=NARROW, height=3.0)
-    axis.plot(x, y, linewidth=1.6, label=name, **line(0))
-    axis.set_xlabel(labels[0])
-    axis.set_ylabel(labels[1])
-    axis.legend(frameon=False, fontsize="small")
-    return save(figure, path)
-
-
 class Curve(NamedTuple):
     """Branch in a bifurcation diagram.
 

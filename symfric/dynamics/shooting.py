@@ -13,20 +13,18 @@ derivatives of phi are those of `simulate`, with saltation matrices at events.
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple, final
+from typing import Any, NamedTuple, final
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.dynamics.equations import Equations, Indices, equations
-from symfric.dynamics.tangent import independent
+from symfric.dynamics.equations import Equations, Indices, equations, independent
+from symfric.foundation import checks
 from symfric.foundation.numeric import Array
 from symfric.foundation.status import SolveError
-from symfric.integrator.equations.inputs import Input
-from symfric.integrator.simulate import simulate
+from symfric.integrator import Input, Trajectory, simulate
 from symfric.model import Model
-from symfric.results.trajectory import Trajectory
 
 METHOD = "rodas5p"
 
@@ -131,7 +129,7 @@ class Shooting:
             return self.states, np.eye(nx)[:, self.states]
         y, d = np.zeros(eq.y.numel()), np.concatenate([np.zeros(len(self.model.u)), p])
         y[:nx] = x
-        of_C, of_slips = (slope.full()[:, :nx] for slope in eq.bounds(y, d))
+        of_C, of_slips = (slope.full()[:, :nx] for slope in eq.slopes(y, d)[1:3])
         C = np.vstack([of_C, of_slips[stuck], np.eye(nx)[eq.modes]])
         return independent(C, eq.scale[:nx], self.states)
 
@@ -193,3 +191,125 @@ class Shooting:
             chosen, T_0 = bases[0]
             phase[: chosen.size] = (parts[0].rates[0] / self.scale**2) @ T_0
         return Linear(r, J, phase, monodromy[bases[0][0]], bases, parts, T, values)
+
+
+ITERATIONS, HALVINGS = 30, 6
+"""Largest numbers of Newton steps, and of halvings of one step."""
+CLOSED = 100.0
+"""Largest difference of start and end of an orbit, in multiples of rtol and of the ranges."""
+LONGEST = 0.3
+"""Largest change of the period in one step, relative to the period."""
+DEPENDENT = 1e-12
+"""Relative singular value below which corrections are not determined."""
+
+
+def solved(problem: Shooting, starts: Array, time: float, p: Mapping[str, float]) -> Linear:
+    """Return the shooting equations at the orbit near `starts` (m, nx) and the time of a period.
+
+    Raises:
+        ValueError: no orbit was found.
+    """
+    where = f"periodic_orbit: expected an orbit of '{problem.model.name}' near the guess"
+    at = tried(problem, starts, time, p)
+    if isinstance(at, ValueError):
+        raise ValueError(f"{where}, got none: {at}") from at
+    before = np.inf
+    for _ in range(ITERATIONS):
+        now = residual(problem, at)
+        if now <= problem.rtol or (now <= CLOSED * problem.rtol and now > before / 4):
+            return at
+        before, better = now, _improved(problem, at, p)
+        if isinstance(better, ValueError):
+            if now <= CLOSED * problem.rtol:
+                return at
+            raise ValueError(f"{where}, got none: {better}; give a run that has settled more")
+        at = better
+    raise ValueError(f"{where}, got none in {ITERATIONS} steps; give a run that has settled more")
+
+
+def tried(
+    problem: Shooting, starts: Array, time: float, p: Mapping[str, float]
+) -> Linear | ValueError:
+    """Return the linearised equations, or the error of a run."""
+    try:
+        return problem.linear(starts, time, p)
+    except ValueError as error:
+        return error
+
+
+def residual(problem: Shooting, at: Linear) -> float:
+    """Return the largest residual relative to the magnitudes of the states."""
+    scales = np.concatenate([problem.scale[chosen] for chosen, _ in at.bases])
+    return float(np.abs(at.r / scales).max(initial=0.0))
+
+
+def moved(problem: Shooting, at: Linear, step: Array) -> tuple[Array, float]:
+    """Return the states and the time after a step of the coordinates."""
+    starts, k = list[Array](), 0
+    for (chosen, directions), segment in zip(at.bases, at.segments, strict=True):
+        starts.append(segment.start + directions @ step[k : k + chosen.size])
+        k += chosen.size
+    return np.array(starts), at.time + (0.0 if problem.driven else float(step[k]))
+
+
+def _improved(problem: Shooting, at: Linear, p: Mapping[str, float]) -> Linear | ValueError:
+    """Return the equations after a damped Newton step, or the reason why there is none."""
+    step, now, share = _step(problem, at), residual(problem, at), 1.0
+    if not problem.driven:
+        share = min(1.0, LONGEST * at.time / max(abs(float(step[-1])), 1e-300))
+    found: Linear | ValueError = ValueError("the iteration does not converge")
+    for _ in range(HALVINGS):
+        found = tried(problem, *moved(problem, at, share * step), p)
+        if not isinstance(found, ValueError):
+            if residual(problem, found) < (1 - share / 4) * now:
+                return found
+            found = ValueError("the iteration does not converge")
+        share /= 2
+    return found
+
+
+def _step(problem: Shooting, at: Linear) -> Array:
+    """Return the Newton step of the coordinates and of the time."""
+    rows = np.concatenate([problem.scale[chosen] for chosen, _ in at.bases])
+    if problem.driven:
+        scaled = at.J * rows / rows[:, None]
+        return rows * np.linalg.lstsq(scaled, -at.r / rows, rcond=DEPENDENT)[0].astype(float)
+    columns = np.append(rows, at.time)
+    phase = at.phase * columns
+    scaled = np.vstack([at.J * columns / rows[:, None], phase / np.abs(phase).max()])
+    right = np.append(-at.r / rows, 0.0)
+    return columns * np.linalg.lstsq(scaled, right, rcond=DEPENDENT)[0].astype(float)
+
+
+REPEATED, SAMPLES = 1e-6, 100
+"""Largest difference after a period, relative to the range of values, and number of samples."""
+
+
+def check_period(
+    model: Model, u: Mapping[str, Input], p: Mapping[str, float], period: float | None
+) -> None:
+    """Check a period [s] of inputs and equations at constant states; samples are not compared.
+
+    Raises:
+        ValueError: a missing period, or a time after which the values do not repeat.
+    """
+    where = "periodic_orbit: period"
+    moving = [name for name, x in u.items() if checks.as_number(x) is None]
+    if period is None and moving:
+        raise checks.refused(
+            where, f"the period [s] of the input {moving[0]}", None, "give period="
+        )
+    ode: Any = model.ode
+    rates = ca.vertcat(ode, *(x(model.t) for x in u.values() if callable(x)))
+    if not ca.depends_on(rates, model.t):
+        return
+    if period is None:
+        raise checks.refused(where, "the period [s] of the equations", None, "give period=")
+    f = ca.Function("rates", [model.t, *map(model.vector, "xzup")], [rates])
+    values = model.values("p", p)
+    fixed = model.started(None, values, 0.0), model.nominal("z"), model.values("u", None), values
+    times = period * (np.arange(2 * SAMPLES) + 1 / np.pi) / SAMPLES
+    rows = np.hstack([f(t, *fixed).full() for t in times])
+    off = np.abs(rows[:, :SAMPLES] - rows[:, SAMPLES:]).max(axis=1)
+    if (off > REPEATED * np.ptp(rows, axis=1) + 1e-12 * np.abs(rows).max(axis=1)).any():
+        raise checks.refused(where, "a period [s] of the inputs and of the equations", period)

@@ -8,15 +8,13 @@ import casadi as ca
 import numpy as np
 
 from symfric.dynamics.curve import Node, Step, corrected
-from symfric.dynamics.families import Orbits
+from symfric.dynamics.families import Family, Orbits, sequence
 from symfric.dynamics.orbit import periodic_orbit
-from symfric.dynamics.trace import Family, finer, sequence
 from symfric.foundation.numeric import Array
 from symfric.foundation.status import SolveError
-from symfric.integrator.simulate import simulate
+from symfric.integrator import Trajectory, simulate
 from symfric.model import Contact
-from symfric.results.quadrature import extremes
-from symfric.results.trajectory import Trajectory
+from symfric.results.signals import extremes
 
 GRAZES, NEARLY = 1e-3, 1e-2
 """Distances from sticking, relative to the largest sliding velocity, at which a branch ends, and up
@@ -61,7 +59,7 @@ def gap(curve: Orbits, node: Node) -> Gap:
         y[: len(model.x)] = [*run.states(at).values()]
         known = run.at(at) if model.u else {}
         d = [*(known[v.name] for v in model.u), *np.outer(node.content.p, np.ones(at.size))]
-        slips = eq.sliding(y, np.array(d).reshape(-1, at.size)).full()
+        slips = eq.values(y, np.array(d).reshape(-1, at.size))[2].full()
         return {str(k): row for k, row in enumerate(np.abs(slips))}
 
     free = {str(k) for k, (c, _) in enumerate(eq.switching) if c.called("stick") not in happened}
@@ -116,7 +114,7 @@ class Near:
 
     def boundary(self, node: Node) -> tuple[str, float]:
         """Return the kind and the parameter of the change after `node`."""
-        value, last, curve = float(node.z[-1]), self.last, finer(self.curve)
+        value, last, curve = float(node.z[-1]), self.last, self.curve.finer()
         if not isinstance(curve, Orbits) or last is None or not self.gaps:
             return "change of stick and slip", value
         if self.gaps[-1].share > NEARLY:

@@ -10,12 +10,11 @@ from symfric.figures.motion import NORMAL_FORCE, scales
 from symfric.foundation import checks
 from symfric.foundation.parameters import check_names, distinct
 from symfric.foundation.status import SolveError
-from symfric.integrator import Input, simulate
+from symfric.integrator import Input, Trajectory, simulate
 from symfric.laws import AnyLaw, Law, Population, any_from_text, law_name, steady_inputs
 from symfric.laws.base.law import require_law
 from symfric.model.kinds import ENERGY
 from symfric.results.kinds import main
-from symfric.results.trajectory import Trajectory
 from symfric.scenes import ALL_SCENES
 
 

@@ -14,15 +14,7 @@ from symfric.foundation.parameters import check_names
 from symfric.foundation.shown import Showing, Shown, Table
 from symfric.foundation.style import DASHES, colour, dash
 from symfric.foundation.units import readable
-from symfric.laws import (
-    ALL_LAWS,
-    PHENOMENA,
-    POPULATIONS,
-    AnyLaw,
-    Law,
-    Population,
-    law_name,
-)
+from symfric.laws import ALL_LAWS, PHENOMENA, POPULATIONS, AnyLaw, Law, Population, law_name
 from symfric.laws.base.law import require_law
 
 if TYPE_CHECKING:

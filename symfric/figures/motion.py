@@ -13,13 +13,10 @@ from numpy.typing import ArrayLike
 from symfric.figures.data import Array, Curve, check_any, phenomena
 from symfric.foundation import checks
 from symfric.foundation.parameters import Variable, parameters
-from symfric.integrator import Hold, Linear, simulate
-from symfric.integrator.equations.inputs import Input
+from symfric.integrator import Hold, Input, Linear, Trajectory, simulate
 from symfric.laws import AnyLaw, Law, Population, law_name, steady_force
 from symfric.model import Event, Model, Output
-from symfric.results.trajectory import Trajectory
-from symfric.scenes.base import contact
-from symfric.scenes.blocks import Drive
+from symfric.scenes import Drive, contact
 
 MASS = 0.8
 """Mass of a driven block [kg], the same as in `Rabinowicz`."""

@@ -9,8 +9,7 @@ import numpy as np
 from symfric.figures.data import Array, Content, Curve, FigureData, behaviour, check_any
 from symfric.figures.motion import MASS, NORMAL_FORCE, Scales, fine, pushed, scales
 from symfric.foundation import checks
-from symfric.integrator import Linear
-from symfric.integrator.equations.inputs import Input
+from symfric.integrator import Input, Linear
 from symfric.laws import AnyLaw, law_name
 
 

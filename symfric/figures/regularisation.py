@@ -33,14 +33,12 @@ from symfric.foundation import checks
 from symfric.foundation.numeric import Array, is_number
 from symfric.foundation.parameters import parameters, with_values
 from symfric.foundation.status import Status
-from symfric.integrator.equations.inputs import Input
-from symfric.integrator.simulate import simulate
+from symfric.integrator import Input, Trajectory, simulate
 from symfric.laws import Law
 from symfric.laws.base.families import WithModes
 from symfric.laws.base.law import require_law
 from symfric.model import Model
 from symfric.model.kinds import FRICTION_STATE, MODE, POSITION
-from symfric.results.trajectory import Trajectory
 from symfric.scenes import Scene
 
 Measure = Sequence[str] | Callable[[Trajectory], Array]

@@ -16,9 +16,9 @@ from symfric.foundation.files import read_json, write_text
 from symfric.foundation.parameters import Parameter, options, parameters, with_values
 from symfric.laws import ALL_LAWS, Law, Viscous, law_from_text
 from symfric.scenes import ALL_SCENES, MECHANISMS, Scene
-from symfric.stress.referee import scenes as referee_scenes
-from symfric.stress.referee.laws import LAWS
-from symfric.stress.referee.solve import Signal, knows
+from symfric.stress.referee import Signal, knows
+from symfric.stress.referee_equations import LAWS
+from symfric.stress.referee_equations import SCENES as REFEREED_SCENES
 
 T = TypeVar("T")
 
@@ -173,7 +173,7 @@ def draw(seed: int, number: int) -> Case:
     """Return case `number` of the campaign `seed`; each case has a separate random sequence."""
     rng = Draws(seed, number)
     refereed = rng.chance(REFEREED)
-    scene = rng.pick(tuple(referee_scenes.SCENES) if refereed else SCENES)
+    scene = rng.pick(tuple(REFEREED_SCENES) if refereed else SCENES)
     text, law = _of_the_referee(rng, scene) if refereed else _law(rng, scene)
     machine = ALL_SCENES[scene](law)
     forms = {name: rng.pick(form.choices) for name, form in options(law).items() if rng.chance(0.3)}

@@ -17,30 +17,9 @@ from typing import final
 
 import numpy as np
 
-from symfric.foundation.status import SolveError, Status
-from symfric.results.trajectory import Trajectory
+from symfric import SolveError, Status, Trajectory
 from symfric.stress.cases import Case
-from symfric.stress.problem import (
-    RIGHT,
-    TIMES,
-    WORK,
-    Answer,
-    Problem,
-    States,
-    amplification,
-    answered,
-    apart,
-    at_steps,
-    attempt,
-    distance,
-    of,
-    other_method,
-    problem,
-    table,
-    third_method,
-    tolerances,
-    worst_step,
-)
+from symfric.stress.problem import RIGHT, TIMES, WORK, Answer, Problem, States, of, problem, table
 
 CLASSES = {
     "right": "equal to the reference within ten tolerances",
@@ -132,7 +111,7 @@ def _failed(ready: Problem, error: SolveError) -> Verdict:
         return _stopped(ready, error)
     steps = error.partial.statistics.steps if isinstance(error.partial, Trajectory) else 0
     case = ready.case
-    other = attempt(ready, case.rtol, other_method(case), ready.attempts)
+    other = ready.attempt(case.rtol, ready.other, ready.attempts)
     through = isinstance(other, Trajectory)
     group = f"{error.status.name}{', another method succeeds' if through else ''}"
     return _refused(group, str(error), steps)
@@ -159,16 +138,15 @@ def _stopped(ready: Problem, error: SolveError) -> Verdict:
 
 def _compared(ready: Problem, run: Trajectory) -> Verdict:
     """Judge a run by the referee or by other methods; if they cannot decide, by each step."""
-    answer = answered(ready, lambda y, states: apart(ready, y, states).max(0))
+    answer = ready.answered()
     if answer is None or answer.doubt[1:].min() > DOUBT:
         verdict = by_methods(ready, run)
     else:
         verdict = _by_referee(ready, run, answer)
     if verdict.kind != "undecided":
         return verdict
-    steps = run.statistics.steps
-    limit = 10 * (steps + run.statistics.rejections) + ready.attempts
-    step = worst_step(ready, run, tolerances(ready, table(run, ready.times)), limit)
+    size = ready.tolerances(table(run, ready.times))
+    step = ready.worst_step(run, size, ready.patience(run))
     text = f"{verdict.reason}, and the error of a single step is up to {step:.3g}"
     if step > RIGHT:
         kind = "silent" if verdict.group == SUSPECT else "undecided"
@@ -179,7 +157,7 @@ def _compared(ready: Problem, run: Trajectory) -> Verdict:
 def _by_referee(ready: Problem, run: Trajectory, answer: Answer) -> Verdict:
     """Judge a run by the referee while its error is small, and by other methods afterwards."""
     sure = int(np.argmax(answer.doubt > DOUBT)) or TIMES
-    over_time = apart(ready, table(run, ready.times), answer.states).max(0)
+    over_time = ready.apart(table(run, ready.times), answer.states).max(0)
     error, steps = float(over_time[:sure].max()), run.statistics.steps
     if sure == TIMES and error <= RIGHT:
         return Verdict("right", "", "", error, steps, "referee")
@@ -188,8 +166,7 @@ def _by_referee(ready: Problem, run: Trajectory, answer: Answer) -> Verdict:
     if sure < TIMES:
         ready = replace(ready, case=replace(ready.case, t_end=float(ready.times[sure - 1])))
         answer = replace(answer, asked=replace(answer.asked, times=ready.times))
-    limit = 10 * (steps + run.statistics.rejections) + ready.attempts
-    return replace(_graded(ready, run, answer.states, error, limit, answer), by="referee")
+    return replace(_graded(ready, run, answer.states, error, answer), by="referee")
 
 
 def by_methods(ready: Problem, run: Trajectory) -> Verdict:
@@ -204,29 +181,29 @@ def by_methods(ready: Problem, run: Trajectory) -> Verdict:
 
 def _by_two(ready: Problem, run: Trajectory, rtol: float) -> Verdict:
     """Judge a run by a method at `rtol` and, if needed, another method at a tenth of it."""
-    case, steps = ready.case, run.statistics.steps
-    limit = 10 * (steps + run.statistics.rejections) + ready.attempts
-    reference = attempt(ready, rtol, other_method(case), limit)
+    steps = run.statistics.steps
+    limit = ready.patience(run)
+    reference = ready.attempt(rtol, ready.other, limit)
     if not isinstance(reference, SolveError):
-        error = distance(ready, run, of(reference))
+        error = ready.distance(run, of(reference))
         if error <= RIGHT:
             return Verdict("right", "", "", error, steps)
-    third = attempt(ready, max(rtol / 10, FINEST), third_method(case), limit)
+    third = ready.attempt(max(rtol / 10, FINEST), ready.third, limit)
     if isinstance(third, SolveError):
         failed = reference if isinstance(reference, SolveError) else third
         text = f"the reference failed: {failed}"
         return Verdict("undecided", text, f"reference: {failed.status.name}", None, steps)
-    error = distance(ready, run, of(third))
+    error = ready.distance(run, of(third))
     if error <= RIGHT:
         return Verdict("right", "", "", error, steps)
     if isinstance(reference, SolveError):
         text = f"{error:.3g} tolerances off one reference; the other failed: {reference}"
         return Verdict("undecided", text, f"reference: {reference.status.name}", error, steps)
-    doubt = distance(ready, reference, of(third))
+    doubt = ready.distance(reference, of(third))
     if doubt > error / 3:
         text = f"{error:.3g} tolerances off, and the references disagree by {doubt:.3g}"
         return Verdict("undecided", text, "references disagree", error, steps)
-    return _graded(ready, run, of(third), error, limit)
+    return _graded(ready, run, of(third), error)
 
 
 def _graded(
@@ -234,14 +211,13 @@ def _graded(
     run: Trajectory,
     truth: States,
     error: float,
-    limit: int,
     answer: Answer | None = None,
 ) -> Verdict:
     """Judge a run with a large error by the growth of one tolerance in the problem."""
     steps, y = run.statistics.steps, truth(ready.times)
-    grown = amplification(ready, y, limit, answer)
+    grown = ready.amplification(y, ready.patience(run), answer)
     text = f"{error:.3g} tolerances off; the problem amplifies one to {grown:.3g}"
-    if error <= LOOSE or at_steps(ready, run, truth) <= LOOSE:
+    if error <= LOOSE or ready.at_steps(run, truth) <= LOOSE:
         return _explained(ready, run, truth, Verdict("loose", text, "", error, steps), grown)
     if error <= max(LOOSE, steps) * grown:
         if error * ready.case.rtol < SENSITIVE:
@@ -258,16 +234,16 @@ def _explained(
     error, text = loose.error or 0.0, loose.reason
     if error <= RIGHT * grown:
         return replace(loose, group="the problem amplifies tolerances")
-    if (between := at_steps(ready, run, truth)) <= RIGHT:
+    if (between := ready.at_steps(run, truth)) <= RIGHT:
         text += f", and the ends of its steps by {between:.3g}"
         return replace(loose, reason=text, group="between steps only")
     # the error at a corner varies by an order of magnitude with the position of the steps
     for divisor, share in ((10, 3), (100, 9)):
         rtol = max(ready.case.rtol / divisor, FINEST)
-        finer = attempt(ready, rtol, ready.case.method, divisor * ready.attempts)
+        finer = ready.attempt(rtol, ready.case.method, divisor * ready.attempts)
         if isinstance(finer, SolveError):
             break
-        less = distance(ready, finer, truth)
+        less = ready.distance(finer, truth)
         text += f", and {less:.3g} at rtol/{divisor}"
         if less <= error / share:
             return replace(loose, reason=text, group="adds up over steps, falls with rtol")

@@ -21,23 +21,28 @@ DARK = (
     "<style>@media (prefers-color-scheme:dark) {article {background:#111;color:#eee}}</style>"
     "<img src='x.png' alt='a' width=9>"
 )
-WRONG = {
+MANY = {
     "console error: bad": "<script>console.error('bad')</script>",
     "exception: worse": "<script>throw new Error('worse')</script>",
     "(wide): picture does not show": "<img src='gone.png' alt='a'>",
-    "(narrow): 2": "<div style='width:3000px'>x</div>",
     "requests http://127.0.0.1:9/": "<img src='http://127.0.0.1:9/x.png' alt='a'>",
     "(wide): formula without extent": "<math style='display:block;height:0'><mi>x</mi></math>",
     "(wide): contrast of 2.8 only": "<p style='color:#999;background:#fff'>pale</p>",
-    "(wide dark): picture drawn for white stands on dark": DARK,
     "(wide): picture without a text in its place": "<img src='x.png'>",
     "(wide): heading 'low' skips a level": "<h3>low</h3>",
     "(wide): 2 headings of the first level": "<h1>again</h1>",
     "(wide): two places of the name 'a'": "<p id=a>x<p id=a>y",
     "(wide): link or button without a name": "<button style='width:9px;height:9px'></button>",
-    "(print): cut at the right": f"<pre style='overflow:auto'>{'long' * 99}</pre>",
-    "(narrow): cut at the right": f"<pre style='overflow:hidden'>{'long' * 30}</pre>",
 }
+"""Independent problems, all on one page."""
+WRONG = {
+    "".join(MANY.values()): tuple(MANY),
+    "<div style='width:3000px'>x</div>": ("(narrow): 2",),
+    DARK: ("(wide dark): picture drawn for white stands on dark",),
+    f"<pre style='overflow:auto'>{'long' * 99}</pre>": ("(print): cut at the right",),
+    f"<pre style='overflow:hidden'>{'long' * 30}</pre>": ("(narrow): cut at the right",),
+}
+"""Body of a page -> problems."""
 needs_browser = pytest.mark.skipif(
     find_spec("playwright") is None or not any(map(shutil.which, NAMES)),
     reason=f"needs Playwright (extra docs) and one of {', '.join(NAMES)}",
@@ -54,14 +59,15 @@ def test_problems_of_pages_are_found_and_good_pages_pass(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "x.png").write_bytes(PNG)
-    for k, body in enumerate(WRONG.values()):
+    for k, body in enumerate(WRONG):
         write(tmp_path, str(k), body)
     bare = "<!DOCTYPE html><meta charset=utf-8><article></article>"
     (tmp_path / "bare.html").write_text(bare, "utf-8")
     assert main(tmp_path) == 1
     found = capsys.readouterr().out.splitlines()
-    for k, sentence in enumerate(WRONG):
-        assert any(f" {k}.html" in line and sentence in line for line in found), sentence
+    for k, sentences in enumerate(WRONG.values()):
+        for sentence in sentences:
+            assert any(f" {k}.html" in line and sentence in line for line in found), sentence
     for sentence in ("hardly a word", "which language", "no title", "no main part", "0 headings"):
         assert any("bare.html" in line and sentence in line for line in found), sentence
     write(tmp_path, "good", "<math><mi>x</mi></math>")

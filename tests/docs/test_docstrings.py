@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from docs.machine.docstrings import escaped, first_line, to_rst
-from docs.machine.formula import latex
+from docs.machine.docstrings import escaped, first_line, latex, to_rst
 from docs.machine.items import MADE_OF_LAWS
 from symfric import ALL_LAWS, Law, parameters, with_values
 from symfric.laws.composed.isotropic import PlanarSlip, SpatialSlip

@@ -11,9 +11,9 @@ from ensembles import assert_same
 
 from symfric import LuGre, rabinowicz, simulate_many
 from symfric.bench.interop import QUICK, integrators, move
+from symfric.bench.ocp import attempted, contenders
 from symfric.bench.ocp_cases import CASES
 from symfric.bench.ocp_contenders import Attempt
-from symfric.bench.ocp_others import attempted, contenders
 from symfric.bench.ocp_referee import judged
 from symfric.bench.report import Row
 

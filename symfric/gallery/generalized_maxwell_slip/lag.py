@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from symfric import GenericAsperity
+from symfric import AnyLaw, GenericAsperity, steady_force
 from symfric.figures import Curve, lag, phenomena, transition
 from symfric.foundation.panels import WIDE, grid
 from symfric.foundation.style import line
@@ -22,7 +22,6 @@ from symfric.gallery.generalized_maxwell_slip.laws import (
 from symfric.gallery.generalized_maxwell_slip.laws import C as TABLE_C
 from symfric.gallery.plate import Drawn, plate
 from symfric.gallery.shared import look
-from symfric.laws import AnyLaw, steady_force
 
 Motion = tuple[float, float, tuple[float, ...], int]
 """Mean and amplitude of a velocity [m/s], frequencies [Hz], and number of periods."""

@@ -14,9 +14,8 @@ from math import asin, copysign, cos, exp, pi, sin, tan
 import numpy as np
 from scipy.linalg import expm
 
-from symfric import QuarterCarGeneral, Trajectory, simulate, with_values
+from symfric import Law, QuarterCarGeneral, Trajectory, simulate, with_values
 from symfric.foundation.numeric import Array
-from symfric.laws import Law
 from symfric.scenes import QuarterCar
 
 START, FIRST, RAMP, HOLD, T_END = 0.3, 2.4, 1.0, 2.0, 12.0  # s

@@ -25,6 +25,7 @@ import casadi as ca
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from symfric import ALL_LAWS, BrownMcPhee, Law, Model, SolveError, simulate
 from symfric.choice.friction import Friction
 from symfric.choice.machine import OWN
 from symfric.choice.measured import Task, measured
@@ -33,10 +34,6 @@ from symfric.figures.regularisation import Machine, machine_of
 from symfric.foundation import checks
 from symfric.foundation.files import json_data
 from symfric.foundation.numeric import Array
-from symfric.foundation.status import SolveError
-from symfric.integrator.simulate import simulate
-from symfric.laws import ALL_LAWS, BrownMcPhee, Law
-from symfric.model import Model
 from symfric.scenes import PendulumBox, Rabinowicz, Scene
 
 EQUAL = 1e-4

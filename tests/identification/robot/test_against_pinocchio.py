@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from identification import Dataset, identify_robot
-from symfric.bench.identification_robot import COULOMB, VISCOUS, arm
+from symfric.bench.identification import COULOMB, VISCOUS, arm
 
 pin: Any = pytest.importorskip("pinocchio", reason="needs Pinocchio (extra pinocchio)")
 

@@ -10,9 +10,9 @@ import pytest
 
 from ocp.friction.event_check import set_valued
 from symfric.bench import ocp
+from symfric.bench.ocp import attempted, contenders
 from symfric.bench.ocp_cases import CASES, Case
 from symfric.bench.ocp_contenders import Attempt, opti
-from symfric.bench.ocp_others import attempted, contenders
 from symfric.bench.ocp_referee import judged
 from symfric.integrator import Hold
 

@@ -7,8 +7,7 @@ import pytest
 
 from symfric import BrownMcPhee, ExactCoulomb, Model, Variable, simulate
 from symfric.bench import ivp, multibody, regularisation
-from symfric.bench.ivp import DIGITS, DRIFT, correct_digits
-from symfric.bench.ivp_mechanisms import ANDREWS, PROBLEMS
+from symfric.bench.ivp import ANDREWS, DIGITS, DRIFT, PROBLEMS, correct_digits
 from symfric.bench.ivp_problems import Problem
 from symfric.bench.multibody import chain, chains, count, exponent
 from symfric.bench.regularisation import CASES, last_cycle, peak

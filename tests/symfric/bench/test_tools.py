@@ -210,10 +210,10 @@ def test_cores_are_measured_and_compared_with_the_c_of_casadi(
     assert own < best < casadi
     assert own < guarded
     assert goal[1]["met"] == "yes"
-    monkeypatch.setattr(embedded, "CYCLES", 20)
-    tables = embedded.bench().tables
+    monkeypatch.setattr(embedded, "CYCLES", 200)
+    tables = embedded.bench(quick=True).tables  # all cores: tests/symfric/embedded
     rows = tables[embedded.TITLE]
-    assert len(rows) == len(embedded.TARGETS)
+    assert len(rows) == 1
     one, many = (row["most instructions"] for row in tables[embedded.CONTROLLERS][:2])
     assert 0 < one < many
     assert {(r["unit test"], r["status"]) for r in rows} == {("ok", "measured")}

@@ -11,8 +11,7 @@ from chains import X, Y, Z, attach, in_both
 
 from symfric import BrownMcPhee, SolveError, Status, simulate
 from symfric import multibody as mb
-from symfric.bench.ivp import correct_digits
-from symfric.bench.ivp_mechanisms import JOINT
+from symfric.bench.ivp import JOINT, correct_digits
 from symfric.multibody.kinematics import constant_slopes
 
 LAW = BrownMcPhee()

@@ -23,27 +23,14 @@ from symfric.stress import Case, Signal, draw
 from symfric.stress.campaign import Report, campaign, rerun
 from symfric.stress.cases import Draws
 from symfric.stress.judge import CLASSES, FAILING, Verdict, by_methods, judge
-from symfric.stress.problem import (
-    RIGHT,
-    Problem,
-    amplification,
-    apart,
-    at_steps,
-    distance,
-    of,
-    problem,
-    question,
-    signal,
-    tolerances,
-    worst_step,
-)
+from symfric.stress.problem import RIGHT, Problem, of, problem, signal
 
 COSTLY = ("arm", "four_bar", "double_pendulum")
 """Scenes of which the suite takes no case."""
 
 
 def test_a_few_random_cases_are_right() -> None:
-    numbers = [n for n in range(24, 36) if draw(1, n).scene not in COSTLY]
+    numbers = [n for n in range(24, 31) if draw(1, n).scene not in COSTLY]
     report = campaign(numbers, work=12_000)
     assert not {n: v.reason for n, v in report.verdicts.items() if v.kind in FAILING}
     assert report.passed
@@ -219,12 +206,12 @@ def test_a_run_as_good_as_its_reference_is_right() -> None:
 
 
 def test_what_is_refused_is_reported_with_its_reason() -> None:
-    bad = replace(EASY, values={"mu_d": 0.5, "mu_s": 0.2})
-    assert (judge(bad).kind, judge(bad).group) == ("refused", "input")
-    assert "expected mu_d <= mu_s" in judge(bad).reason
-    stuck = Case(1, 1, "four_mass", "lugre", t_end=1.0)
-    assert judge(stuck).kind == "refused"
-    assert judge(stuck).group.startswith("STEP_TOO_SMALL")
+    bad = judge(replace(EASY, values={"mu_d": 0.5, "mu_s": 0.2}))
+    assert (bad.kind, bad.group) == ("refused", "input")
+    assert "expected mu_d <= mu_s" in bad.reason
+    stuck = judge(Case(1, 1, "four_mass", "lugre", t_end=1.0))
+    assert stuck.kind == "refused"
+    assert stuck.group.startswith("STEP_TOO_SMALL")
 
 
 class Wrong:
@@ -268,10 +255,10 @@ def test_a_foreign_exception_comes_through(monkeypatch: pytest.MonkeyPatch) -> N
 def test_distance_counts_tolerances() -> None:
     ready = problem(EASY)
     run = ready.run(1e-6, "rodas5p", max_steps=10_000)
-    assert distance(ready, run, of(run)) == 0.0
+    assert ready.distance(run, of(run)) == 0.0
     shifted = replace(run, states=lambda t: {n: y + 2e-6 for n, y in run.states(t).items()})
     table = np.stack([run["x"], run["v"]])
-    assert distance(ready, shifted, of(run)) == pytest.approx(2e-6 / tolerances(ready, table).min())
+    assert ready.distance(shifted, of(run)) == pytest.approx(2e-6 / ready.tolerances(table).min())
 
 
 def test_a_model_with_events_may_be_early_or_late_by_its_tolerance() -> None:
@@ -283,7 +270,7 @@ def test_a_model_with_events_may_be_early_or_late_by_its_tolerance() -> None:
 
     for shift, fits in ((-late, True), (late, True), (-3 * late, False), (3 * late, False)):
         y = truth(ready.times + shift)
-        assert (apart(ready, y, truth)[:, 1:-1].max() < 1e-6) == fits
+        assert (ready.apart(y, truth)[:, 1:-1].max() < 1e-6) == fits
 
 
 def test_what_a_problem_makes_of_a_tolerance_is_measured() -> None:
@@ -291,9 +278,9 @@ def test_what_a_problem_makes_of_a_tolerance_is_measured() -> None:
     fall = Case(1, 1, "pendulum", "viscous", {"sigma_2": 0.0}, x0={"phi": np.pi - 1e-3}, t_end=1.0)
     ready, w = problem(fall), np.sqrt(9.81 * 0.5 / (1 / 12 + 0.25))
     run = ready.run(1e-9, "radau5", max_steps=ready.attempts)
-    angle, rate = tolerances(ready, np.stack([run["phi"], run["phi_rate"]]))[:, 0]
+    angle, rate = ready.tolerances(np.stack([run["phi"], run["phi_rate"]]))[:, 0]
     grown = angle * w * np.sinh(w) + rate * np.cosh(w)
-    assert amplification(ready, of(run)(ready.times), ready.attempts) == pytest.approx(
+    assert ready.amplification(of(run)(ready.times), ready.attempts) == pytest.approx(
         grown / rate, rel=0.01
     )
 
@@ -312,7 +299,7 @@ def test_the_referee_sees_what_all_methods_share(monkeypatch: pytest.MonkeyPatch
 
 def test_what_the_referee_does_not_know_is_judged_by_methods() -> None:
     case = Case(1, 1, "rabinowicz", "viscous", t_end=2.0)
-    assert question(problem(case), problem(case).times) is None
+    assert problem(case).question() is None
     assert (judge(case).kind, judge(case).by) == ("right", "methods")
     assert judge(EASY).by == "referee"
 
@@ -345,21 +332,21 @@ def test_errors_between_correct_ends_of_steps_are_reported_separately() -> None:
         ends = np.isin(t, run.step_times)
         return {name: y + np.where(ends, 0.0, 1e-3) for name, y in run.states(t).items()}
 
-    assert distance(ready, replace(run, states=bent), of(run)) > 100
-    assert at_steps(ready, replace(run, states=bent), of(run)) == 0.0
-    assert at_steps(ready, replace(run, states=lambda t: bent(t - 1e-9)), of(run)) > 100
+    assert ready.distance(replace(run, states=bent), of(run)) > 100
+    assert ready.at_steps(replace(run, states=bent), of(run)) == 0.0
+    assert ready.at_steps(replace(run, states=lambda t: bent(t - 1e-9)), of(run)) > 100
 
 
 def test_a_step_that_leaps_is_found_and_steps_that_add_up_are_not_blamed() -> None:
     ready = problem(EASY)
     fine = ready.run(1e-8, "radau5", max_steps=10_000)
     run = ready.run(1e-6, "rodas5p", max_steps=10_000)
-    sizes = tolerances(ready, np.stack([fine["x"], fine["v"]]))
-    assert worst_step(ready, run, sizes, 10_000) <= RIGHT
+    sizes = ready.tolerances(np.stack([fine["x"], fine["v"]]))
+    assert ready.worst_step(run, sizes, 10_000) <= RIGHT
     late = run.step_times[run.step_times.size // 2]
 
     def shifted(t: np.ndarray) -> dict[str, np.ndarray]:
         return {name: y + np.where(t > late, 1e-4, 0.0) for name, y in run.states(t).items()}
 
-    found = worst_step(ready, replace(run, states=shifted), sizes, 10_000)
+    found = ready.worst_step(replace(run, states=shifted), sizes, 10_000)
     assert found == pytest.approx(1e-4 / sizes.min(), rel=0.1)

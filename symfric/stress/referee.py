@@ -1,4 +1,6 @@
-"""Motion of the machines of `scenes` with the laws of `laws`, computed by SciPy.
+"""Motion of the machines with the laws of `referee_equations`, computed by SciPy.
+
+Both files use only NumPy, SciPy and the standard library.
 
 LSODA integrates smooth laws between the kinks of the force and of the machine. Exact Coulomb
 friction is integrated from event to event: each contact slides forward, slides back or rests until
@@ -16,8 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.stress.referee.laws import DYNAMIC, LAWS
-from symfric.stress.referee.scenes import SCENES, Force, Scene
+from symfric.stress.referee_equations import DYNAMIC, LAWS, SCENES, Force, Scene
 
 Array = NDArray[np.float64]
 EVALUATIONS = 150_000

@@ -1,1 +1,0 @@
-"""Independent laws, scenes and solver, using only NumPy, SciPy and the standard library."""
