@@ -35,18 +35,18 @@ if TYPE_CHECKING:
     from identification.residuals.shooting import Shooting as Shooting
     from identification.result.fitted import Fitted as Fitted
     from identification.result.fitted import load_fit as load_fit
-    from identification.result.series import Estimate as Estimate
+    from identification.result.parts import Estimate as Estimate
     from identification.robot.excitation import excitation as excitation
     from identification.robot.identify import identify_robot as identify_robot
     from identification.robot.identify import robot_information as robot_information
     from identification.robot.result import RobotFit as RobotFit
     from identification.robot.result import load_robot as load_robot
     from identification.select import select as select
+    from identification.starts.experiments import break_away as break_away
+    from identification.starts.experiments import six_steps as six_steps
     from identification.starts.maxwell_slip import fit_elements as fit_elements
     from identification.starts.measured import Measured as Measured
-    from identification.starts.measured import break_away as break_away
     from identification.starts.measured import hysteresis as hysteresis
-    from identification.starts.six_steps import six_steps as six_steps
     from identification.starts.start import start_values as start_values
     from identification.starts.stribeck import binned as binned
     from identification.starts.stribeck import fit_curve as fit_curve

@@ -17,26 +17,19 @@ import numpy as np
 
 from identification.data.dataset import Dataset
 from identification.data.findings import Findings
-from identification.from_data import (
-    centre,
-    explained,
-    findings_of,
-    measured,
-    slowest,
-    strongest,
-)  # fmt: skip
-from identification.residuals.evaluation import Array, Residuals
+from identification.residuals.evaluation import THRESHOLD, Array, Residuals
 from identification.residuals.inverse import PART, InverseDynamics, InverseRows
 from identification.residuals.points import PointRows, Points
-from identification.result.build import fitted, levels_of, tried, written
+from identification.result.build import fitted, tried, written
 from identification.result.fitted import Fitted
-from identification.result.live import Asked, Kind, Live, expanded, matters
-from identification.solving.descent import Start, descend, remaining
-from identification.solving.many_starts import Progress, best_of, many_starts, scattered
-from identification.solving.task import THRESHOLD, Task, task
-from identification.starts.measured import Measured
+from identification.result.parts import Asked, Kind, Live, expanded, matters
+from identification.solving.descent import Progress, Start, best_of, descend, many_starts
+from identification.solving.task import Task, remaining, task
+from identification.starts.measured import Measured, measured, roles
+from identification.starts.start import centre
 from identification.unknowns.subject import Subject, subject
-from identification.unknowns.unknowns import Unknowns, unknowns_of
+from identification.unknowns.unknowns import Unknowns, scattered, unknowns_of
+from identification.verdict.covariance import Levels
 from identification.verdict.judge import Verdict, judge
 from symfric.foundation import checks
 from symfric.foundation.status import SolveError, Status
@@ -48,8 +41,6 @@ SMALL = 0.1
 """Largest dead time [samples] in which residuals of long records are taken as linear."""
 LONGEST = 30
 """Largest dead time that is estimated [samples]."""
-OF_KIND = ("x0", "dead_time")
-"""Entries of `free` that belong to the residuals."""
 
 
 @final
@@ -225,11 +216,16 @@ class Fit:
             moving=imposed and kind.states != "steady" if isinstance(kind, Points) else None,
             turning=self.data.rotary,
             v_max=0.0 if seen is None else seen.fastest,
-            v_min=slowest(kind, seen),
+            v_min=seen.slowest if seen is not None and isinstance(kind, Points) else 0.0,
             natural=None if seen is None or self.start == "law" else seen.natural,
         )
         checks.check_names("Fit: start", given, found.names)
         values = centre(found, None if self.start == "law" else seen, given)
+
+        def posed(residuals: Residuals) -> Task:
+            unknowns = _unknowns(residuals, found)
+            return task(residuals, unknowns, noise, self.loss, found.guard)
+
         try:
             kind, noise = _with_noise(kind, self.noise, found, self.data)
             if getattr(kind, "windows", None) == "choose":
@@ -238,11 +234,13 @@ class Fit:
                 chosen: Any = kind
                 kind = choose(chosen, found, self.data, self._quickly)
             residuals = kind.prepare(found, self.data, values)
-        except ValueError as error:
-            raise explained(error, findings) from None
-        made = self._task(residuals, found, noise)
-        easier = tuple(self._task(r, found, noise) for r in getattr(residuals, "easier", ()))
-        made = replace(made, easier=easier)
+        except ValueError as error:  # an error found in the data explains it
+            if not findings.errors:
+                raise
+            sentence = findings.errors[0].sentence.rstrip(".")
+            raise ValueError(f"data '{findings.name}': {sentence}; then {error}") from None
+        easier = tuple(map(posed, getattr(residuals, "easier", ())))
+        made = replace(posed(residuals), easier=easier)
         return Prepared(kind, found, findings, made, made.unknowns.of(values), seen)
 
     def live(self, noise: dict[str, float], w: Array) -> Live:
@@ -266,24 +264,20 @@ class Fit:
         values = dict(zip(made.residuals.names, point.values.tolist(), strict=True))
         drive = asked.subject.drive
         mass = None if drive is None else float(values.get("m", drive.m))
-        largest = strongest(asked.kind, self.data, asked.seen, mass)
-        v = np.zeros(1) if asked.seen is None else asked.seen.v
-        levels = levels_of(asked.subject, values, largest, v, self.data.rotary)
-        return Live(asked.kind, asked.subject, self.data, made, point, levels)
+        seen, kind = asked.seen, asked.kind
+        loaded = isinstance(kind, Points) and (
+            kind.N is not None or any("N" in r for r in self.data)
+        )
+        largest = None if seen is None or loaded else seen.strongest(mass)
+        v = np.zeros(1) if seen is None else seen.v
+        levels = Levels.of(asked.subject, values, largest, v, self.data.rotary)
+        return Live(kind, asked.subject, self.data, made, point, levels)
 
     def _quickly(self, kind: Kind, data: Dataset) -> dict[str, float] | None:
         """Fit other data from one start without a verdict; return the values, None if it fails."""
         asked = replace(self, kind=kind, data=data).prepared()
         end = descend(asked.task, asked.centre, 0, min(self.evaluations, QUICK))
         return asked.task.unknowns.named(end.w) if np.isfinite(end.cost) else None
-
-    def _task(self, residuals: Residuals, found: Subject, noise: object) -> Task:
-        """Return the least-squares problem of the residuals.
-
-        Raises:
-            ValueError: fewer residuals than unknowns.
-        """
-        return task(residuals, _unknowns(residuals, found), noise, self.loss, found.guard)
 
 
 def _unknowns(residuals: Residuals, found: Subject) -> Unknowns:
@@ -331,6 +325,13 @@ class Refined(NamedTuple):
     end: Start
 
 
+def findings_of(kind: object, data: Dataset) -> Findings:
+    """Return the findings of the data check for these residuals."""
+    if isinstance(kind, Points):
+        return data.check()
+    return data.check(**{p: n for p, n in roles(kind).items() if any(n in r for r in data)})
+
+
 def _status(asked: Prepared, end: Start, verdict: Verdict, gain: float) -> tuple[Status, str]:
     """Return status and message of the fit; `gain` is an argument of `Verdict.status`."""
     status, message = verdict.status(end.status, gain), end.message
@@ -349,11 +350,11 @@ def _status(asked: Prepared, end: Start, verdict: Verdict, gain: float) -> tuple
 
 
 def _to_kind(kind: Kind, free: Any) -> tuple[Kind, Any]:
-    """Pass the entries of `OF_KIND` to the residuals; return them and the other entries."""
+    """Pass start values and dead times to the residuals; return them and the other entries."""
     if not isinstance(free, Mapping):
         return kind, free
     given: dict[str, Any] = dict(free)  # pyright: ignore[reportUnknownArgumentType]
-    mine = {name: given.pop(name) for name in OF_KIND if name in given}
+    mine = {name: given.pop(name) for name in ("x0", "dead_time") if name in given}
     known = {item.name for item in fields(kind)}  # pyright: ignore[reportArgumentType]
     for name in mine:
         if name not in known:

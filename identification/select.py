@@ -35,8 +35,8 @@ from identification.data.dataset import Dataset
 from identification.fit import Fit
 from identification.residuals.inverse import InverseDynamics
 from identification.result.fitted import Fitted
-from identification.result.live import Kind
-from identification.solving.many_starts import Progress
+from identification.result.parts import Kind
+from identification.solving.descent import Progress
 from symfric.foundation import checks
 from symfric.foundation.files import json_data
 from symfric.foundation.shown import Shown, Table, columns

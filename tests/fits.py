@@ -13,8 +13,8 @@ from identification.data.findings import Finding
 from identification.residuals.evaluation import Channel, Evaluation, Residuals
 from identification.result.build import fitted, tried
 from identification.result.fitted import Fitted
-from identification.result.live import Live
-from identification.solving.many_starts import best_of, many_starts
+from identification.result.parts import Live
+from identification.solving.descent import best_of, many_starts
 from identification.solving.task import task
 from identification.unknowns.spec import Unknown
 from identification.unknowns.subject import Subject, subject

@@ -7,7 +7,7 @@ Source: Gautier, Janot and Vandanjon, IEEE Trans. Control Syst. Technol. 21(2), 
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from math import ceil, floor, log2, log10
 from typing import Any, final
 
@@ -100,11 +100,7 @@ def lowpass(signal: Array, cutoff: float, step: float, order: int = 4) -> Array:
         such = f"below the Nyquist frequency {0.5 / step:g} Hz"
         raise ValueError(f"lowpass: cutoff: expected {such}, got {cutoff:g} Hz")
     line = np.linspace(signal[0], signal[-1], signal.size)
-
-    def gain(f: Array) -> Array:
-        ratio = np.tan(np.pi * f) / np.tan(np.pi * cutoff * step)
-        return 1 / (1 + ratio ** (2 * order))
-
+    gain = partial(Filter(cutoff, order=order).gain, step=step)
     return line + weighted(signal - line, gain, DECAY / (cutoff * step), odd=True)
 
 

@@ -1,18 +1,23 @@
-"""Readers of files by suffix, and of Python objects, as columns."""
+"""Readers of files by suffix, and of Python objects, as columns.
+
+HDF5 files (also MATLAB 7.3) and Parquet files need optional packages.
+"""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from glob import glob, has_magic
+from importlib import import_module
 from os import PathLike
 from pathlib import Path
 from re import DOTALL, fullmatch
-from typing import Any, TypeVar
+from typing import Any, BinaryIO, TypeVar
 
 import numpy as np
 
-from identification.data.mat_file import read_variables
+from identification.data.mat_file import Node, node, of_variables, read_variables
 from identification.data.raw import Raw, Wanted, column_of, record
 from identification.data.record import Record
+from identification.data.text import read_text
 from identification.data.units import CHANNELS
 from symfric.foundation import checks
 from symfric.foundation.files import write_table
@@ -67,41 +72,75 @@ def to_csv(record: Record, path: Path) -> Path:
     return path
 
 
-def _text(file: Path, variable: str | None) -> list[Raw]:
-    """Return the columns of a text file."""
-    from identification.data.text import read_text  # noqa: PLC0415 (slow to import)
+def read_hdf5(file: Path, variable: str | None) -> Record | list[Raw]:
+    """Return the columns of an HDF5 file, whose groups are structs.
 
-    _refuse(file, variable)
-    return [read_text(file)]
+    Raises:
+        ValueError: the package is not installed, the file is damaged, or there are no columns.
+    """
 
+    def read(h5py: Any, stream: BinaryIO) -> dict[str, Node]:
+        with h5py.File(stream, "r") as group:
+            return _struct(group)
 
-def _hdf5(file: Path, variable: str | None) -> Record | list[Raw]:
-    """Return the columns of an HDF5 file."""
-    from identification.data.archives import read_hdf5  # noqa: PLC0415 (slow to import)
-
-    return read_hdf5(file, variable)
-
-
-def _parquet(file: Path, variable: str | None) -> list[Raw]:
-    """Return the columns of a Parquet file."""
-    from identification.data.archives import read_parquet  # noqa: PLC0415 (slow to import)
-
-    _refuse(file, variable)
-    return [read_parquet(file)]
+    content = _by_package(file, "an HDF5 file", "h5py", read)
+    return of_variables(f"read '{file.name}'", file.name, content, variable)
 
 
-def _refuse(file: Path, variable: str | None) -> None:
-    if variable is not None:
-        such = "variable= only of .mat, .npz, .npy and .h5 files"
-        raise ValueError(f"read '{file.name}': expected {such}")
+def read_parquet(file: Path) -> Raw:
+    """Return the columns of a Parquet file.
+
+    Raises:
+        ValueError: the package is not installed, or the file is damaged.
+    """
+    where = f"read '{file.name}'"
+    table = _by_package(file, "a Parquet file", "pyarrow.parquet", lambda p, s: p.read_table(s))
+    pairs = zip(table.column_names, table.columns, strict=True)
+    return Raw(file.name, tuple(column_of(where, key, values) for key, values in pairs))
+
+
+def _by_package(file: Path, such: str, module: str, read: Callable[[Any, BinaryIO], T]) -> T:
+    """Return the content of a file, read by a module of an optional package."""
+    where, package = f"read '{file.name}'", module.partition(".")[0]
+    try:
+        reader = import_module(module)
+    except ImportError:
+        raise ValueError(
+            f"{where}: expected the package {package} to read {file.suffix}, got none installed; "
+            f"run 'pip install {package}', or save the data as .csv"
+        ) from None
+    with file.open("rb") as stream:
+        try:
+            return read(reader, stream)
+        except Exception as error:  # noqa: BLE001 (damaged bytes raise various errors)
+            first = (str(error).splitlines() or [""])[0]
+            raise ValueError(
+                f"{where}: expected {such}, got a damaged or another file: {first}"
+            ) from None
+
+
+def _struct(group: Any) -> dict[str, Node]:
+    """Return the datasets and groups of a group by name, without links to nothing.
+
+    MATLAB hides some names by `#`.
+    """
+    found = {k: v for k, v in group.items() if v is not None and not k.startswith("#")}
+    return {k: _struct(v) if hasattr(v, "items") else _numbers(v[()]) for k, v in found.items()}
+
+
+def _numbers(value: Any) -> Node:
+    """Return a dataset as a node; MATLAB stores vectors as matrices of one row."""
+    array = np.asarray(value)
+    return node(np.squeeze(array) if array.ndim > 1 and 1 in array.shape else array)
 
 
 TEXT = (".csv", ".txt", ".tsv", ".dat", ".asc", ".log", ".prn", ".data", "")
-READERS: dict[str, Callable[[Path, str | None], Record | list[Raw]]] = {
-    **dict.fromkeys(TEXT, _text), **dict.fromkeys((".mat", ".npz", ".npy"), read_variables),
-    **dict.fromkeys((".h5", ".hdf5"), _hdf5), **dict.fromkeys((".parquet", ".pq"), _parquet),
+PARQUET = (".parquet", ".pq")
+READERS: dict[str, Callable[..., Any]] = {
+    **dict.fromkeys(TEXT, read_text), **dict.fromkeys((".mat", ".npz", ".npy"), read_variables),
+    **dict.fromkeys((".h5", ".hdf5"), read_hdf5), **dict.fromkeys(PARQUET, read_parquet),
 }  # fmt: skip
-"""Functions that read a file, by its suffix."""
+"""Functions that read a file, by its suffix; those of text and Parquet return one table."""
 Paths = str | PathLike[str] | Sequence[str | PathLike[str]]
 
 
@@ -143,8 +182,11 @@ def _read(file: Path, wanted: Wanted, variable: str | None) -> list[Record]:
     if suffix not in READERS:
         such = f"one of {', '.join(filter(None, READERS))}"
         raise ValueError(f"{where}: expected {such}, got '{file.suffix}'")
+    single = suffix in (*TEXT, *PARQUET)
+    if single and variable is not None:
+        raise ValueError(f"{where}: expected variable= only of .mat, .npz, .npy and .h5 files")
     try:
-        found = READERS[suffix](file, variable)
+        found = [READERS[suffix](file)] if single else READERS[suffix](file, variable)
     except OSError as error:
         got = error.strerror or error
         raise ValueError(f"read '{file}': expected a readable file, got {got}") from None

@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 
 from identification.data.dataset import Dataset
 from identification.data.differentiate import levels
-from identification.data.path import SmoothPath, smooth_path
 from identification.data.record import LONG, Record
 from identification.residuals.evaluation import Array, Blocks, Channel
-from identification.residuals.path_noise import PathNoise
+from identification.residuals.path_noise import PathNoise, SmoothPath, smooth_path
 from identification.residuals.sampled import (
     Sampled,
     begun,

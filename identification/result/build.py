@@ -3,39 +3,43 @@
 import platform
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, fields, is_dataclass, replace
-from math import inf, isfinite
+from itertools import pairwise
+from math import inf, isfinite, nan
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from identification.data.dataset import Dataset
+from identification.data.differentiate import differentiated
 from identification.data.findings import Finding
+from identification.data.record import Record
 from identification.residuals.evaluation import Array
 from identification.result.fitted import Fitted
-from identification.result.live import Asked, Kind, Live, errors_of, labels
-from identification.result.machine_units import sides_of
-from identification.result.series import (
+from identification.result.outcome import sides_of
+from identification.result.parts import (
+    Asked,
     Curve,
     Estimate,
+    Kind,
+    Line,
+    Live,
     Series,
     Tried,
-    of_drive,
-    of_points,
-    points_each,
-    series,
+    errors_of,
+    labels,
 )
 from identification.solving.descent import Start
 from identification.solving.task import Task
 from identification.unknowns.roles import is_coefficient
 from identification.unknowns.spec import Above, Range, Tied
-from identification.unknowns.subject import Subject
-from identification.verdict.covariance import Levels
 from identification.verdict.judge import Verdict
 from symfric import __version__
 from symfric.foundation.parameters import Parametric, parameters
 from symfric.foundation.status import Status
 from symfric.foundation.units import turned
+from symfric.laws import Law
+from symfric.laws.base.law import FORCE
 from symfric.laws.composed.populations import steady_force
 from symfric.model import Model
 from symfric.scenes import Drive, Scene
@@ -92,12 +96,23 @@ def _rule(rule: Range | Above | Tied) -> str:
     return f"{kind}({', '.join([repr(rule.lower), repr(rule.upper), *start])})"
 
 
-SPEEDS = 20
-"""Number of measured speeds at which the law is evaluated, in each direction."""
 STEP = 1e-2
 """Step of the differences for the band of a curve, in standard errors."""
 MOST = 40
 """Number of values above which correlations with start values of records are left out."""
+POINTS = 2000
+"""Largest number of points of a line, about two for each column of pixels."""
+GAP = 3.0
+"""Smallest gap in time, relative to the usual step."""
+LEAST = 300
+TOGETHER = 24_000
+"""Total number of points of one type of line; with many channels, each line has fewer points."""
+SIDE = 300
+"""Number of points of a curve in each direction, down to a millionth of the largest speed."""
+DOTS = 4000
+"""Largest number of measured points that are drawn, over all records."""
+REST = 1e-3
+"""Share of the largest speed above which a point has a direction."""
 
 
 def fitted(
@@ -172,7 +187,7 @@ def _estimates(live: Live) -> dict[str, Estimate]:
             others = ", ".join(n for n in group if n != name)
             notes[name] = f"not separable from {others}" if others else "without influence"
     columns = (made.standard_errors, made.low, made.high, made.white_errors)
-    whole, unit_load = subject.scene or subject.law, load_of(subject) == 1.0
+    whole, unit_load = subject.scene or subject.law, subject.load == 1.0
     known = {} if whole is None else parameters(whole)
     estimates: dict[str, Estimate] = {}
     for name in dict.fromkeys([*subject.variables, *task.residuals.names]):
@@ -194,43 +209,6 @@ def _estimates(live: Live) -> dict[str, Estimate]:
     return estimates
 
 
-def levels_of(
-    subject: Subject, values: Mapping[str, float], largest: float | None, v: Array, turning: bool
-) -> Levels | None:
-    """Return the friction levels of a law under a known load; None if the load is not known.
-
-    Args:
-        subject: fitted law or drive.
-        values: fitted values by name.
-        largest: largest friction force in the data [N].
-        v: measured velocities [m/s].
-        turning: True for rates and moments.
-    """
-    whole, load = subject.drive or subject.law, load_of(subject)
-    law = subject.close(values).law
-    if whole is None or load is None or largest is None or law is None:
-        return None
-    if law.inputs:
-        return None  # friction alone does not determine the loads of its levels
-    force = turned("N") if turning else "N"
-    levels = {n: p for n, p in parameters(whole).items() if p.role == "level"}
-    loads = {n: load if is_coefficient(p) else 1.0 for n, p in levels.items()}
-    speeds = np.quantile(np.abs(v), np.linspace(0.05, 1.0, SPEEDS))
-    both = np.concatenate([-speeds, speeds])
-    return Levels(
-        {n: loads[n] for n, p in levels.items() if p.unit in ("1", force)}, largest, force,
-        float(np.abs(steady_force(law, both, load)).max()),
-    )  # fmt: skip
-
-
-def load_of(subject: Subject) -> float | None:
-    """Return the normal force of a drive or of points [N]; None if there is no single load."""
-    if subject.drive is not None:
-        return float(subject.drive.N)
-    loads = [v.start for v in subject.model.u if v.name == "N"] if subject.scene is None else []
-    return float(loads[0]) if loads and subject.law is not None else None
-
-
 def tried(task: Task, starts: Sequence[Start]) -> tuple[Tried, ...]:
     """Return the ends of the starts, best first."""
     best = min([s.objective for s in starts if isfinite(s.objective)], default=0.0)
@@ -241,30 +219,122 @@ def tried(task: Task, starts: Sequence[Start]) -> tuple[Tried, ...]:
     )  # fmt: skip
 
 
+def envelope(t: Array, y: Array, most: int = POINTS) -> Line:
+    """Return a line of at most `most` points that covers the same area as the signal.
+
+    The ends and the extreme values in each of most / 2 equal intervals are kept, so that no spike
+    is lost. Non-finite values are left out.
+    """
+    finite = np.isfinite(y)
+    t, y = t[finite], y[finite]
+    if y.size <= most:
+        return Line(t, y)
+    edges = np.linspace(0, y.size, max(1, (most - 2) // 2) + 1).astype(int)
+    spans = list(pairwise(edges.tolist()))
+    low = [a + int(np.argmin(y[a:b])) for a, b in spans]
+    high = [a + int(np.argmax(y[a:b])) for a, b in spans]
+    kept = np.unique([0, *low, *high, y.size - 1])
+    return Line(t[kept], y[kept])
+
+
+def cut_envelope(t: Array, y: Array, most: int = POINTS) -> Line:
+    """Return the envelope of a signal over time, with a NaN in every gap to interrupt the line."""
+    steps = np.diff(t)
+    gaps = np.flatnonzero(steps > GAP * np.median(steps)) + 1 if steps.size else steps.astype(int)
+    if not 0 < gaps.size <= most // 10:
+        return envelope(t, y, most)
+    lines: list[Line] = []
+    for a, b in pairwise([0, *gaps.tolist(), t.size]):
+        lines.append(envelope(t[a:b], y[a:b], max(4, most * (b - a) // t.size)))
+        lines.append(Line(t[b - 1 : b], np.array([nan])))
+    return Line(
+        *(np.concatenate(part[:-1]) for part in ([x.t for x in lines], [x.y for x in lines]))
+    )
+
+
 def _series(live: Live, records: Sequence[str], verdict: Verdict) -> tuple[Series, ...]:
+    """Return the signals of all channels for plots, with fewer points each of many channels."""
     residuals, data = live.task.residuals, live.data
     timed = all(record.t is not None for record in data)
     abscissa = "t [s]" if timed else ("v [rad/s]" if data.rotary else "v [m/s]")
-    most, r = points_each(len(residuals.channels)), live.point.evaluation.r
-    return tuple(
-        series(c, records[c.record], r, verdict.whiteness[label], abscissa, most)
-        for c, label in zip(residuals.channels, labels(residuals), strict=True)
-    )
+    most = int(np.clip(TOGETHER // max(1, len(residuals.channels)), LEAST, POINTS))
+    found = list[Series]()
+    for c, label in zip(residuals.channels, labels(residuals), strict=True):
+        order = slice(None) if c.ordered else np.argsort(c.t, kind="stable")
+        r = live.point.evaluation.r[c.rows]
+        t, measured, left = (y[order] for y in (c.t, c.measured, r))
+        line = cut_envelope if c.ordered else envelope
+        seen, predicted, residual = (line(t, y, most) for y in (measured, measured + left, left))
+        white = verdict.whiteness[label]
+        found.append(
+            Series(
+                records[c.record], c.signal, c.unit, abscissa, c.ordered, left.size, seen,
+                predicted, residual, c.t[list(c.breaks)], white.lags, white.correlation,
+                white.low, white.high,
+            )
+        )  # fmt: skip
+    return tuple(found)
 
 
 def _curve(live: Live) -> Curve | None:
     """Return friction over velocity of a law in a drive or fitted to points; None for others."""
     law, machine, data = live.closed.law, live.closed.scene, live.data
     if isinstance(machine, Drive):
-        return _banded(live, of_drive(machine, data.records), float(machine.N))
-    load = load_of(live.subject)
+        return _banded(live, _of_drive(machine, data.records), float(machine.N))
+    load = live.subject.load
     if law is None or load is None:
         return None
     points = {
         data[c.record].name: (c.regressors.get("v", c.t), c.measured)
         for c in live.task.residuals.channels
     }
-    return _banded(live, of_points(law, load, points, data.rotary), load)
+    return _banded(live, _of_points(law, load, points, data.rotary), load)
+
+
+def _of_points(law: Law, N: float, points: dict[str, tuple[Array, Array]], turning: bool) -> Curve:
+    """Return the curve of a law with measured points (v, F) of each record."""
+    lines = {name: Line(v, F) for name, (v, F) in points.items()}
+    inputs = [f"{i.name} = {i.steady:g} {i.unit}" for i in law.inputs if i.name != FORCE]
+    says = ", ".join(["measured points", *(f"line at {one}" for one in inputs)])
+    return _over_velocity(law, N, lines, turning, says)
+
+
+def _of_drive(drive: Drive, records: Sequence[Record]) -> Curve:
+    """Return the curve of the law of a drive, with force - m a - offset of the records.
+
+    Records without position, force or equal intervals have no points.
+    """
+    lines = dict[str, Line]()
+    for record in records:
+        if record.t is None or "force" not in record or "x" not in record:
+            continue
+        try:
+            found = differentiated(record, None)
+        except ValueError:  # no acceleration: unequal intervals, or too short
+            continue
+        m, offset = float(drive.m), float(drive.offset)
+        parts = [(s.equations(s.v), s.equations(s.force - m * s.a - offset)) for s in found]
+        lines[record.name] = Line(*map(np.concatenate, zip(*parts, strict=True)))
+    says = "measured: force - m a - offset" if lines else "no record has force and position"
+    return _over_velocity(drive.law, float(drive.N), lines, drive.turning, says)
+
+
+def _over_velocity(law: Law, N: float, lines: dict[str, Line], turning: bool, says: str) -> Curve:
+    """Return the curve with every n-th point of the lines, at most about `DOTS` in total."""
+    every = max(1, -(-sum(line.t.size for line in lines.values()) // DOTS))
+    measured = {name: Line(line.t[::every], line.y[::every]) for name, line in lines.items()}
+    top = max([float(np.abs(line.t).max(initial=0.0)) for line in measured.values()], default=0.0)
+    if top == 0.0:
+        scale = law.velocity_scale
+        top = 10.0 * float(scale) if np.isfinite(float(scale)) else 1.0
+    side = np.geomspace(1e-6 * top, top, SIDE)
+    seen = [np.sign(line.t[np.abs(line.t) > REST * top]) for line in measured.values()]
+    ways = np.unique(np.concatenate(seen)) if seen else np.zeros(0)
+    v = np.concatenate([-side[::-1], [0.0], side])
+    if ways.size == 1:  # the data do not show the other direction
+        v = np.sort(ways[0] * side)
+    unit = turned if turning else str
+    return Curve(unit("m/s"), unit("N"), Line(v, steady_force(law, v, N)), measured, says)
 
 
 def _banded(live: Live, curve: Curve, N: float) -> Curve:

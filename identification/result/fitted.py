@@ -8,9 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
 
 from identification.data.dataset import Dataset
-from identification.result.live import Live
 from identification.result.outcome import Outcome, sentences
-from identification.result.series import Errors
+from identification.result.parts import Errors, Live
 from identification.verdict.bootstrap import Bootstrap, bootstrap
 from identification.verdict.profile import Profile, profile
 from symfric.foundation import packed

@@ -27,7 +27,7 @@ from identification.result.outcome import (
     unit_of,
     with_unit,
 )
-from identification.result.series import Curve, Errors, Estimate, Series, limits
+from identification.result.parts import Curve, Errors, Estimate, Series, limits
 from identification.result.stored import source_of
 from identification.verdict.judge import Test
 from symfric.foundation.status import Status

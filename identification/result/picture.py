@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from identification.result.outcome import Outcome
-from identification.result.series import Curve, Series, limits
+from identification.result.parts import Curve, Series, limits
 from symfric.foundation import checks
 from symfric.foundation.panels import grid, panels, save
 from symfric.foundation.style import colour

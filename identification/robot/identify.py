@@ -10,14 +10,20 @@ from numpy.typing import NDArray
 from identification.data.dataset import Dataset
 from identification.data.filters import Filter
 from identification.data.record import Array
-from identification.result.series import Estimate
+from identification.result.parts import Estimate
 from identification.result.stored import plain
-from identification.robot.base import Base, base_of
-from identification.robot.consistent import consistent
+from identification.robot.base import Base, base_of, consistent
 from identification.robot.dynamics import WHERE, RobotModel
-from identification.robot.estimate import METHODS, Equations, Estimated, estimate
+from identification.robot.estimate import (
+    METHODS,
+    Equations,
+    Estimated,
+    Information,
+    estimate,
+    information,
+    seen_in,
+)
 from identification.robot.friction import USUAL, JointLaw, laws_of
-from identification.robot.information import Information, information, seen_in
 from identification.robot.motion import RobotMotion, motions
 from identification.robot.result import OFFSET, RobotFit, TorqueError, TorqueSeries
 from identification.verdict.minimum import Sandwich

@@ -10,11 +10,10 @@ import numpy as np
 
 from identification.data.dataset import Dataset
 from identification.data.record import Array
-from identification.result.series import Estimate
+from identification.result.parts import Estimate
 from identification.result.stored import from_data, plain, revived
-from identification.robot.dynamics import RobotModel, inertial_of
-from identification.robot.information import Information
-from identification.robot.update import updated_urdf
+from identification.robot.dynamics import RobotModel, inertial_of, updated_urdf
+from identification.robot.estimate import Information
 from symfric.foundation import checks
 from symfric.foundation.files import read_json, write_text
 from symfric.foundation.shown import Showing, Shown, Table, columns, counted

@@ -1,4 +1,4 @@
-"""Descent from one start to a minimum, with a status of the result.
+"""Descents from one or many starts to a minimum, with a status of each result.
 
 The trust-region method of SciPy (`least_squares`, method "trf") keeps iterates inside the bounds,
 scales by the derivatives and is deterministic. Robust losses and weights are applied to the rows
@@ -12,21 +12,37 @@ A simulation over a whole record has many minima far from the truth; a simulatio
 the data in every window has few. All starts except the first therefore begin on the `easier`
 problems of the task (multiple shooting) and end on the task itself.
 
+Results of many starts are processed in the order of the start numbers, on any executor. The search
+ends early if the best start leaves only white noise, or if `AGREE` starts find the same lowest
+minimum. Further results are dropped, so that the outcome is bit-identical on every executor.
+
 Sources: M. A. Branch, T. F. Coleman, Y. Li, SIAM J. Sci. Comput. 21, 1999; J. Nocedal, S. J.
 Wright, Numerical Optimization, 2nd ed., 2006, chapter 10; H. G. Bock, in Modelling of Chemical
 Reaction Systems, Springer, 1981.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Generator, Sequence
+from concurrent.futures import BrokenExecutor, Executor
 from dataclasses import dataclass, replace
+from functools import partial
 from importlib import import_module
 from typing import Any, final
 
 import numpy as np
 
 from identification.residuals.evaluation import Array
-from identification.solving.task import NOISELESS, Point, Task, change, levels, objective
-from symfric.foundation.status import Status
+from identification.solving.task import (
+    Point,
+    Task,
+    change,
+    is_white,
+    levels,
+    objective,
+    remaining,
+    variance,
+)
+from symfric.foundation.executors import in_order
+from symfric.foundation.status import SolveError, Status
 
 Tell = Callable[[int], None]
 
@@ -36,8 +52,6 @@ tenth of a standard error).
 """
 KINKS = 1.0
 """Acceptable predicted fall that no step achieves because of kinks of a law with switches."""
-FAR = 15.0
-"""Largest trusted step; for a logarithmic coordinate a factor of three million."""
 NOWHERE = 1e-13
 """Largest change of a coordinate that is not a step."""
 ROUNDS = 12
@@ -205,32 +219,6 @@ def _renew(search: _Search) -> float:
     return change(old, search.task.noise)
 
 
-def variance(task: Task, point: Point) -> float:
-    """Return the variance of the weighted residuals; at least 1 if a noise level is given."""
-    freedom = max(1, task.rows - point.w.size)
-    least = 1.0
-    if set(task.noise) == set(task.estimated):
-        least = max((NOISELESS * task.spread(s) / task.noise[s]) ** 2 for s in task.noise)
-    return max(least, point.cost / freedom)
-
-
-def remaining(task: Task, point: Point) -> float:
-    """Return the fall of the cost that a Gauss-Newton step in the free coordinates predicts.
-
-    The step is limited to `FAR` in any principal direction. Beyond, derivatives are not reliable,
-    and a coordinate without influence would need an unlimited step.
-    """
-    f, J = point.reduced
-    g, box = np.einsum("ij,i->j", J, f), task.unknowns
-    near = box.at_bound(point.w)
-    low = near & (point.w - box.lower < box.upper - point.w)
-    free = ~((low & (g > 0)) | (near & ~low & (g < 0)))
-    u, s, _ = np.linalg.svd(J[:, free], full_matrices=False)
-    part = np.abs(u.T @ f)
-    reached = np.minimum(part, FAR * s)
-    return float(((2 * part - reached) * reached).sum())
-
-
 def _verdict(search: _Search) -> tuple[Status, str]:
     """Return the status of the search and a message."""
     task, point = search.task, search.best
@@ -284,3 +272,118 @@ def _parameters(task: Task, w: Array, shared: set[str]) -> dict[str, float]:
     """Return the values that both problems fit, except those of single records and windows."""
     values, own = task.unknowns.named(w), set(task.unknowns.nuisance)
     return {name: x for name, x in values.items() if name in shared and name not in own}
+
+
+Progress = Callable[[str, float], None]
+"""Callback that is given the current activity and the completed fraction."""
+
+AGREE = 3
+"""Number of starts that must find the same lowest minimum for an early end."""
+SAME = 1.0
+"""Difference of minus twice the log-likelihood below which two minima are the same."""
+
+
+def many_starts(
+    task: Task,
+    starts: Sequence[Array],
+    executor: Executor | None = None,
+    progress: Progress | None = None,
+    evaluations: int = 120,
+    agree: int = AGREE,
+) -> tuple[Start, ...]:
+    """Descend from each of `starts`, shape (n,) each.
+
+    Args:
+        task: the problem; it must be picklable if there is an executor.
+        starts: coordinates of the starts.
+        executor: executor of threads or processes; None: one start after the other in this thread.
+        progress: called after each start; without an executor also before each evaluation.
+        evaluations: limit of residual evaluations for each start; if the best start reaches the
+            limit, it continues with as many again.
+        agree: number of starts that must find the same minimum for an early end; 0: never.
+
+    Returns:
+        The ends in the order of the start numbers, with costs for the noise levels of the best
+        one. One end if the residuals are linear, because there is only one minimum. After Ctrl-C,
+        the starts finished so far and the state of the interrupted start.
+    """
+    done: list[Start] = []
+    if len(starts) > 1 and task.is_linear(starts[0]):
+        starts = starts[:1]
+    task = task.reduced(starts[0])
+    found = _in_turn(task, starts, executor, progress, evaluations)
+    try:
+        for start in found:
+            done.append(start)
+            if progress is not None:
+                progress(f"start {len(done)} of {len(starts)}", len(done) / len(starts))
+            if start.status is Status.INTERRUPTED or (agree and _enough(task, done, agree)):
+                break
+    except BrokenExecutor as error:
+        why = f"a worker process ended after {len(done)} of {len(starts)} starts (killed, or out "
+        why += "of memory); fewer workers need less memory"
+        if not done:
+            raise SolveError(f"fit: {why}", Status.INTERRUPTED) from error
+        _mark_interrupted(done, why)
+    except KeyboardInterrupt:
+        if not done:
+            raise
+        _mark_interrupted(done, f"interrupted by the user after {len(done)} starts")
+    finally:
+        found.close()
+    best = best_of(done)
+    interrupted = any(start.status is Status.INTERRUPTED for start in done)
+    if best.status is Status.MAX_ITERATIONS and not interrupted:
+        more = descend(task, best.w, best.number, evaluations)
+        if more.objective <= best.objective:
+            spent = best.evaluations + more.evaluations
+            done[done.index(best)] = best = replace(more, evaluations=spent)
+    if not np.isfinite(best.objective):
+        return tuple(done)
+    return tuple(replace(s, cost=best.cost + s.objective - best.objective) for s in done)
+
+
+def _mark_interrupted(done: list[Start], why: str) -> None:
+    """Mark the best start as interrupted, unless it is at a minimum."""
+    best = best_of(done)
+    if not best.status.ok:
+        message = f"{why}; best result so far"
+        done[done.index(best)] = replace(best, status=Status.INTERRUPTED, message=message)
+
+
+def best_of(starts: Sequence[Start]) -> Start:
+    """Return the start with the highest likelihood, the first one if several are equal."""
+    return min(starts, key=lambda s: (s.objective, s.number))
+
+
+def _in_turn(
+    task: Task,
+    starts: Sequence[Array],
+    executor: Executor | None,
+    progress: Progress | None,
+    evaluations: int,
+) -> Generator[Start]:
+    """Yield the ends in the order of the start numbers."""
+    if executor is None:
+        for number, w in enumerate(starts):
+            tell = None if progress is None else partial(_tell, progress, number, len(starts))
+            yield descend_easier_first(task, w, number, evaluations, tell)
+        return
+    calls = [(w, number, evaluations) for number, w in enumerate(starts)]
+    yield from in_order(executor, descend_easier_first, task, calls)
+
+
+def _tell(progress: Progress, number: int, count: int, evaluation: int) -> None:
+    progress(f"start {number + 1} of {count}, evaluation {evaluation}", number / count)
+
+
+def _enough(task: Task, done: Sequence[Start], agree: int) -> bool:
+    """Return True if no further start is needed."""
+    best = best_of(done)
+    same = [s for s in done if s.status.ok and s.objective - best.objective < SAME]
+    if best.status.ok and len(same) >= agree:
+        return True
+    if not best.status.ok or best is not done[-1]:
+        return False
+    point = task.with_noise(best.noise).at(best.w)
+    return isinstance(point, Point) and is_white(task, point)

@@ -2,10 +2,6 @@
 
     minimise over w   sum_signals [ n_s ln sigma_s ] + 1/2 sum_rows loss(r_i(p(w)) / sigma_s(i))
 
-A loss C^2 rho((r/C)^2) equals e^2 with e = C sign(r) sqrt(rho((r/C)^2)). C is the residual, in
-standard deviations, above which an outlier costs less. e is smooth, so the problem remains one of
-least squares, with exact derivatives e' = rho' r / e.
-
 Noise levels are those of maximum likelihood; d_s are the degrees of freedom that the fit takes from
 signal s:
 
@@ -14,8 +10,7 @@ signal s:
 Rows are reduced block by block to the triangle R of a QR factorisation (a sequential TSQR). Blocks
 are so small that BLAS uses only one thread, and the bits do not depend on the number of threads.
 
-Sources: P. J. Huber, E. M. Ronchetti, Robust Statistics, 2nd ed., 2009; B. Triggs et al., Bundle
-Adjustment, 2000, section 3; Y. Bard, Nonlinear Parameter Estimation, 1974, section 4-9; J. Demmel,
+Sources: Y. Bard, Nonlinear Parameter Estimation, 1974, section 4-9; J. Demmel,
 L. Grigori, M. Hoemmen, J. Langou, SIAM J. Sci. Comput. 34, 2012.
 """
 
@@ -27,47 +22,18 @@ from typing import Any, final
 
 import numpy as np
 
-from identification.residuals.evaluation import Array, Channel, Evaluation, Residuals
+from identification.residuals.evaluation import (
+    THRESHOLD,
+    Array,
+    Channel,
+    Evaluation,
+    Residuals,
+    influence,
+    shaped,
+)
 from identification.unknowns.spec import Unknown
 from identification.unknowns.unknowns import Unknowns
 from symfric.foundation import checks
-
-THRESHOLD = {"squares": np.inf, "huber": 1.345, "soft_l1": 1.0, "cauchy": 2.385, "arctan": 3.0}
-"""Loss -> C. huber and cauchy have 95 % efficiency for normal noise."""
-
-
-def shaped(r: Array, loss: str) -> tuple[Array, Array]:
-    """Return e and de/dr of residuals r in standard deviations, both of the shape of r."""
-    C = THRESHOLD[loss]
-    if loss == "squares":
-        return r, np.ones_like(r)
-    z = (r / C) ** 2
-    rho, slope = _rho(z, loss)
-    small = z < 1e-12
-    e = np.where(small, np.abs(r), C * np.sqrt(np.where(small, 1.0, rho)))
-    de = np.where(small, 1.0, slope * np.abs(r) / np.where(small, 1.0, e))
-    return np.sign(r) * e, de
-
-
-def influence(r: Array, loss: str) -> Array:
-    """Return the weight rho' of each residual in the normal equations, 1 for small residuals."""
-    if loss == "squares":
-        return np.ones_like(r)
-    return _rho((r / THRESHOLD[loss]) ** 2, loss)[1]
-
-
-def _rho(z: Array, loss: str) -> tuple[Array, Array]:
-    """Return rho(z) and its derivative, rho(z) = z + O(z^2)."""
-    if loss == "huber":
-        root = np.sqrt(np.maximum(z, 1.0))
-        return np.where(z <= 1, z, 2 * root - 1), 1 / root
-    if loss == "soft_l1":
-        root = np.sqrt(1 + z)
-        return 2 * (root - 1), 1 / root
-    if loss == "cauchy":
-        return np.log1p(z), 1 / (1 + z)
-    return np.arctan(z), 1 / (1 + z**2)
-
 
 ENTRIES = 8192
 """Entries of a block and its triangle; OpenBLAS uses threads from 9216 entries on (gemv)."""
@@ -328,8 +294,36 @@ def _shown(names: Sequence[str], values: Array) -> str:
 
 NOISELESS = 1e-8
 """Least noise level relative to the spread of a signal, the accuracy limit of simulations."""
+FAR = 15.0
+"""Largest trusted step; for a logarithmic coordinate a factor of three million."""
 NORMAL = 1.4826
 """Ratio of the standard deviation of normal noise to the median of its magnitude."""
+
+
+def variance(task: Task, point: Point) -> float:
+    """Return the variance of the weighted residuals; at least 1 if a noise level is given."""
+    freedom = max(1, task.rows - point.w.size)
+    least = 1.0
+    if set(task.noise) == set(task.estimated):
+        least = max((NOISELESS * task.spread(s) / task.noise[s]) ** 2 for s in task.noise)
+    return max(least, point.cost / freedom)
+
+
+def remaining(task: Task, point: Point) -> float:
+    """Return the fall of the cost that a Gauss-Newton step in the free coordinates predicts.
+
+    The step is limited to `FAR` in any principal direction. Beyond, derivatives are not reliable,
+    and a coordinate without influence would need an unlimited step.
+    """
+    f, J = point.reduced
+    g, box = np.einsum("ij,i->j", J, f), task.unknowns
+    near = box.at_bound(point.w)
+    low = near & (point.w - box.lower < box.upper - point.w)
+    free = ~((low & (g > 0)) | (near & ~low & (g < 0)))
+    u, s, _ = np.linalg.svd(J[:, free], full_matrices=False)
+    part = np.abs(u.T @ f)
+    reached = np.minimum(part, FAR * s)
+    return float(((2 * part - reached) * reached).sum())
 
 
 def levels(task: Task, point: Point) -> dict[str, float]:
@@ -372,3 +366,27 @@ def _shares(task: Task, point: Point) -> dict[str, float]:
     return {
         signal: sum(square(whitened[c.rows]) for c in _of(task, signal)) for signal in task.noise
     }
+
+
+WHITE = 3.0
+"""Correlation of neighbours, relative to its standard deviation, rarely exceeded by white noise."""
+LARGEST = 6.0
+"""Residual, relative to the root mean square, rarely exceeded by normal noise of 1e6 samples."""
+
+
+def is_white(task: Task, point: Point) -> bool:
+    """Return True if the residuals of each channel are uncorrelated at several lags, without peaks.
+
+    A law that misses a short part of the motion leaves few large residuals.
+    """
+    for channel in task.channels:
+        r = point.r[channel.rows]
+        if not channel.ordered or r.size < 20:
+            return False
+        if np.abs(r).max() > LARGEST * np.sqrt(np.mean(r**2)):
+            return False
+        for lag in (1, 2, 4):
+            pairs = float(np.sum(r[lag:] * r[:-lag])) / max(square(r), 1e-300)
+            if abs(pairs) > WHITE / np.sqrt(r.size):
+                return False
+    return True

@@ -1,4 +1,4 @@
-"""Friction samples for start values: break-away forces of ramps, stiffness after reversals."""
+"""Friction samples for start values, and the stiffness after reversals."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -9,7 +9,9 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.data.record import runs
+from identification.data.dataset import Dataset
+from identification.data.differentiate import differentiated
+from identification.residuals.points import Points
 from identification.unknowns.roles import Natural
 from symfric.foundation import checks
 
@@ -17,6 +19,8 @@ Array = NDArray[np.float64]
 
 LEAST = 3
 """Smallest number of samples for an estimate."""
+FEW = 0.01
+"""Share of points whose speed may be arbitrarily small, such as noise about rest."""
 
 
 @final
@@ -81,6 +85,17 @@ class Measured:
         return float(np.abs(self.v).max())
 
     @property
+    def slowest(self) -> float:
+        """Speed [m/s] above which nearly all samples not at rest lie; 0 if all are at rest."""
+        speeds = np.abs(self.v[self.v != 0])
+        return float(np.quantile(speeds, FEW)) if speeds.size else 0.0
+
+    def strongest(self, mass: float | None) -> float:
+        """Return the largest force on the friction [N]: F at rest, F - m a in sliding."""
+        moving = self.F if self.a is None or mass is None else self.F - mass * self.a
+        return float(max(np.abs(self.F).max(), np.abs(moving).max()))
+
+    @property
     def natural(self) -> Natural:
         """Natural units: root mean square of F, N, and travel in the time at the largest speed."""
         force, speed = float(np.sqrt(np.mean(self.F**2))) or 1.0, self.fastest or 1.0
@@ -111,125 +126,31 @@ def _samples(name: str, given: object, size: int) -> Array:
     return found
 
 
-REST = 0.02
-"""Share of the largest speed below which a body counts as at rest."""
-SHORTEST = 5
-"""Smallest number of samples of a rest."""
-RISE = (0.3, 0.9)
-"""Shares of the break-away force between which the loading rate is evaluated."""
-APART = 2.0
-"""Smallest ratio of loading rates for which their effect is evaluated."""
+def measured(kind: object, data: Dataset, load: float) -> Measured | None:
+    """Return velocity and force of all points or of a drive; None if unavailable.
 
-
-@final
-@dataclass(frozen=True)
-class BreakAway:
-    """A break-away event.
-
-    Attributes:
-        t: time of the largest force [s].
-        force: largest force, in the direction of the subsequent motion [N].
-        rate: loading rate before that time [N/s].
-        side: direction of the motion, 1 or -1.
+    Blocks represent a long record of a drive.
     """
-
-    t: float
-    force: float
-    rate: float
-    side: int
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class BreakAways:
-    """Break-away events of a data set.
-
-    Attributes:
-        events: events in order of time.
-        level: median force of both directions [N].
-        scatter: median absolute deviation of the force, relative to its median.
-        per_decade: change of the force per decade of the loading rate [N], by linear regression on
-            the logarithm of the rate; None if the rates differ by less than a factor of 2.
-        error: standard error of `per_decade` [N].
-    """
-
-    events: tuple[BreakAway, ...]
-    level: float
-    scatter: float
-    per_decade: float | None
-    error: float
-
-    @property
-    def note(self) -> str:
-        """Message about the effect of the loading rate."""
-        rates = [event.rate for event in self.events]
-        span = f"{min(rates):.3g} to {max(rates):.3g} N/s"
-        if self.per_decade is None:
-            return f"all loading rates are similar ({span}): their effect on the force is unknown"
-        if abs(self.per_decade) < 2 * self.error:
-            return f"no effect of the loading rate is visible ({span})"
-        word = "decreases" if self.per_decade < 0 else "increases"
-        return (
-            f"the force {word} by {abs(self.per_decade):.3g} +- {self.error:.2g} N for each factor "
-            f"of ten of the loading rate ({span}): use the slowest ramps for the static level"
-        )
+    try:
+        if isinstance(kind, Points):
+            timed = all(r.t is not None for r in data)
+            names = {"v": kind.v, "F": kind.F} | ({"t": "t"} if timed else {})
+            each = [{p: r[n] if n in r else kind.path(r).v for p, n in names.items()} for r in data]
+        else:
+            called, chosen = roles(kind), getattr(kind, "filter", None)
+            motions = [m for r in data for m in differentiated(r, chosen, **called)]
+            each = [{"v": m.v, "F": m.force, "x": m.x, "t": m.t, "a": m.a} for m in motions]
+        signals = {part: np.concatenate([one[part] for one in each]) for part in each[0]}
+        breaks = tuple(np.cumsum([one["v"].size for one in each])[:-1].tolist())
+        return Measured(**signals, N=load, breaks=breaks)
+    except ValueError:  # preparing the residuals reports missing channels
+        return None
 
 
-def break_away(measured: Measured, *, rest: float = REST, offset: float = 0.0) -> BreakAways:
-    """Find the break-away forces of all ramps in a record.
-
-    A rest is an interval of at least 5 samples below `rest` times the largest speed that ends in
-    motion. The break-away force is the largest force in the direction of that motion during the
-    rest. The samples must resolve the rise of the force; otherwise the maximum is missed.
-
-    Args:
-        measured: samples with times; the force excludes inertia, or the ramps are slow.
-        rest: share of the largest speed.
-        offset: constant force [N] in addition to friction.
-
-    Raises:
-        ValueError: no times, or no rest that ends in motion.
-    """
-    rest = checks.number("break_away: rest", rest, above=0.0, upper=0.9)
-    if measured.t is None:
-        raise ValueError("break_away: expected a record with times, got points; pass t=")
-    events = tuple(e for r in measured.records for e in _events(measured, r, rest, offset))
-    if not events:
-        raise ValueError(
-            f"break_away: expected a rest of at least {SHORTEST} samples below {rest:g} of the "
-            "largest speed that ends in motion, got none"
-        )
-    forces = np.array([event.force for event in events])
-    level = float(np.median(forces))
-    scatter = float(np.median(np.abs(forces - level))) / abs(level)
-    decades = np.log10([event.rate for event in events])
-    if len(events) < 3 or np.ptp(decades) < np.log10(APART):
-        return BreakAways(events, level, scatter, None, 0.0)
-    X = np.column_stack([np.ones(decades.size), decades])
-    w, *_ = np.linalg.lstsq(X, forces, rcond=None)
-    spread = float(np.sum((forces - X @ w) ** 2)) / (decades.size - 2)
-    error = float(np.sqrt(spread * np.linalg.inv(X.T @ X)[1, 1]))
-    return BreakAways(events, level, scatter, float(w[1]), error)
-
-
-def _events(measured: Measured, record: slice, rest: float, offset: float) -> Iterator[BreakAway]:
-    t, v, F = np.asarray(measured.t)[record], measured.v[record], measured.F[record] - offset
-    for begin, end in runs(np.abs(v) < rest * measured.fastest):
-        if end - begin < SHORTEST or end >= v.size:
-            continue
-        side = int(np.sign(v[end]))
-        ramp = side * F[begin : end + 1]
-        top = int(np.argmax(ramp))
-        if top == 0 or ramp[top] <= 0:
-            continue
-        low, high = (share * ramp[top] for share in RISE)
-        below = np.flatnonzero(ramp[:top] <= low)
-        rise = slice(below[-1] + 1 if below.size else 0, top)  # the last rise
-        times, force = t[begin : begin + top][rise], ramp[rise]
-        rising = force < high
-        rate = float(np.polyfit(times[rising], force[rising], 1)[0]) if rising.sum() > 1 else 0.0
-        if rate > 0:
-            yield BreakAway(float(t[begin + top]), float(ramp[top]), rate, side)
+def roles(kind: object) -> dict[str, str]:
+    """Return the names of the channels of position and force of a drive."""
+    names = {name: getattr(kind, name, name) for name in ("x", "force")}
+    return {name: given if isinstance(given, str) else name for name, given in names.items()}
 
 
 DEAD = 2e-3

@@ -1,6 +1,7 @@
 """Start values of any law from data, assigned by the roles of the parameters."""
 
 from collections.abc import Collection, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from math import isfinite, sqrt
 from typing import NamedTuple
@@ -11,6 +12,7 @@ from identification.starts.maxwell_slip import Elements, fit_elements
 from identification.starts.measured import Array, Hysteresis, Measured, hysteresis, travelled
 from identification.starts.stribeck import BINS, Curve, StribeckCurve, binned, fit_curve, fit_law
 from identification.unknowns.roles import Natural, orders, parts, velocity
+from identification.unknowns.subject import Subject
 from symfric.foundation import checks
 from symfric.foundation.parameters import Parameter, parameters
 from symfric.laws.base.law import Law
@@ -84,6 +86,17 @@ def start_values(
         units = Natural()
     found = _start_values(units.rescaled(what), measured.rescaled(units), names)
     return {n: sizes[n] * x for n, x in found.items()}
+
+
+def centre(subject: Subject, seen: Measured | None, given: Mapping[str, float]) -> dict[str, float]:
+    """Return the start of each free parameter: from the user, otherwise the data, then the law."""
+    values, found = {u.name: u.start for u in subject.unknowns}, dict[str, float]()
+    whole: Law | Drive | None = subject.law if subject.scene is None else subject.drive
+    if whole is not None and seen is not None:
+        with suppress(ValueError):  # without motion in the data, keep the values of the law
+            found = start_values(whole, seen, free=[*values])
+    started = subject.requests.started
+    return values | {n: x for n, x in found.items() if n not in started} | dict(given)
 
 
 def _start_values(what: Law | Drive, measured: Measured, names: Sequence[str]) -> dict[str, float]:

@@ -89,6 +89,14 @@ class Subject:
         """The machine if it is a `Drive`, otherwise None."""
         return self.scene if isinstance(self.scene, Drive) else None
 
+    @property
+    def load(self) -> float | None:
+        """Normal force of a drive or of points [N]; None if there is no single load."""
+        if self.drive is not None:
+            return float(self.drive.N)
+        loads = [v.start for v in self.model.u if v.name == "N"] if self.scene is None else []
+        return float(loads[0]) if loads and self.law is not None else None
+
     def close(self, values: Mapping[str, float]) -> Closed:
         """Replace the symbols by numbers; in the model, they become starts of its parameters.
 
@@ -148,7 +156,7 @@ def subject(
     if isinstance(what, Model):
         return _of_model(what, requests)
     if isinstance(what, str):
-        from symfric.laws import law_from_text  # noqa: PLC0415 (slow to import)
+        from symfric.laws.catalogue import law_from_text  # noqa: PLC0415 (slow to import)
 
         what = law_from_text(what)
     if not isinstance(what, Law | Scene):
@@ -171,7 +179,7 @@ def _of_parts(
     speeds: roles.Speeds, natural: roles.Natural,
 ) -> Subject:  # fmt: skip
     """Return the subject of a law (for points) or of a scene (for a motion)."""
-    from symfric.laws import law_name  # noqa: PLC0415 (slow to import)
+    from symfric.laws.catalogue import law_name  # noqa: PLC0415 (slow to import)
 
     known = parameters(whole)
     symbols = [n for n, p in known.items() if not is_number(p.value)]

@@ -267,3 +267,47 @@ def unknowns_of(
     function = ca.Function("values", [w], [column, ca.densify(ca.jacobian(column, w))])
     box = np.array([(c.lower, c.upper) for c in each]).reshape(-1, 2)
     return Unknowns(tuple(unknowns), tuple(names), box[:, 0], box[:, 1], function)
+
+
+REACH = 5.0
+"""Largest factor by which a positive value is changed."""
+WIDE = 1e3
+"""Ratio of bounds up to which the whole range is searched; wider bounds are natural limits."""
+
+
+def scattered(at: Unknowns, centre: Array, count: int, seed: int = 0) -> list[Array]:
+    """Return `count` starts, the first at `centre`, deterministic for a given `seed`.
+
+    The others are a Latin hypercube around it. Positive values are multiplied by factors up to
+    `REACH`, values bounded by the user cover their range, and values of either sign change by up
+    to half their magnitude; start values of records are unchanged.
+    Source: M. D. McKay, R. J. Beckman, W. J. Conover, Technometrics 21, 1979.
+
+    Args:
+        at: unknowns with their box.
+        centre: coordinates, shape (n,).
+        count: number of starts.
+        seed: seed of the random numbers.
+    """
+    rng = np.random.default_rng(seed)
+    n, others = centre.size, max(count - 1, 0)
+    cells = np.stack([rng.permutation(others) for _ in range(n)], axis=1).reshape(others, n)
+    shares = (cells + rng.random((others, n))) / max(others, 1)
+    box = at.unknowns, *(x.tolist() for x in (centre, at.lower, at.upper))
+    moved = (np.array([*map(_moved, *box, row)], float) for row in shares.tolist())
+    return [at.inside(w) for w in (centre, *moved)]
+
+
+def _moved(unknown: Unknown, w: float, lower: float, upper: float, share: float) -> float:
+    """Return one coordinate moved according to `share` in (0, 1)."""
+    side, bounded = 2 * share - 1, np.isfinite(upper) and np.isfinite(lower)
+    if unknown.nuisance and not bounded:
+        return w
+    narrow = upper - lower < np.log(WIDE) or not unknown.logarithmic or unknown.above
+    if bounded and narrow:
+        return lower + share * (upper - lower)
+    if unknown.logarithmic or unknown.above:
+        return w + side * np.log(REACH)
+    if lower >= 0 and w > 0:
+        return w * REACH**side
+    return w + 0.5 * side * abs(w)

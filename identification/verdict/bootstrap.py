@@ -8,7 +8,7 @@ Sources: H. R. Kuensch, Ann. Statist. 17(3), 1989 (moving blocks); B. Efron, R. 
 Introduction to the Bootstrap, 1993.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from math import ceil
@@ -16,10 +16,9 @@ from typing import final
 
 import numpy as np
 
-from identification.residuals.evaluation import Array, Channel, Evaluation, Residuals
+from identification.residuals.evaluation import Array, Extended
 from identification.solving.descent import descend
 from identification.solving.task import Point, Task
-from identification.unknowns.spec import Unknown
 from symfric.foundation import checks
 from symfric.foundation.executors import in_order
 from symfric.foundation.shown import brief
@@ -77,35 +76,6 @@ class Bootstrap:
         return "\n".join(lines)
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Resampled:
-    """Residuals of data that are changed by `shift`, shape (rows,)."""
-
-    residuals: Residuals
-    shift: Array
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the values."""
-        return self.residuals.names
-
-    @property
-    def own(self) -> tuple[Unknown, ...]:
-        """Unknowns of the data."""
-        return self.residuals.own
-
-    @property
-    def channels(self) -> Sequence[Channel]:
-        """Channels of the rows."""
-        return self.residuals.channels
-
-    def at(self, values: Array) -> Evaluation | str:
-        """Return residuals and derivatives, or a message."""
-        found = self.residuals.at(values)
-        return found if isinstance(found, str) else Evaluation(found.r + self.shift, found.J)
-
-
 def bootstrap(
     task: Task,
     point: Point,
@@ -157,6 +127,7 @@ def _drawn(r: Array, length: int, random: np.random.Generator) -> Array:
 
 def _fitted(task: Task, w: Array, shift: Array) -> Array | None:
     """Return the values fitted to resampled data; None without residuals."""
-    again = replace(task, residuals=Resampled(task.residuals, shift), easier=())
+    changed = Extended(task.residuals, (), np.zeros((shift.size, 0)), shift)
+    again = replace(task, residuals=changed, easier=())
     end = descend(again, w, 0, EVALUATIONS)
     return again.unknowns.values(end.w) if np.isfinite(end.cost) else None

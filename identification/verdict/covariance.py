@@ -20,9 +20,16 @@ from numpy.typing import NDArray
 
 from identification.residuals.evaluation import Array
 from identification.solving.task import Point, Task
+from identification.unknowns.roles import is_coefficient
+from identification.unknowns.subject import Subject
 from identification.verdict.minimum import Minimum, groups
+from symfric.foundation.parameters import parameters
 from symfric.foundation.shown import brief
+from symfric.foundation.units import turned
+from symfric.laws.composed.populations import steady_force
 
+SPEEDS = 20
+"""Number of measured speeds at which a law is evaluated, in each direction."""
 FAR = 3.0
 """Ratio of a level's force to the largest friction force above which it is not identifiable."""
 
@@ -42,6 +49,32 @@ class Levels(NamedTuple):
     largest: float
     unit: str = "N"
     curve: float = 0.0
+
+    @classmethod
+    def of(
+        cls, subject: Subject, values: Mapping[str, float], largest: float | None, v: Array,
+        turning: bool,
+    ) -> "Levels | None":  # fmt: skip
+        """Return the levels of a law under a known load; None if the load is not known.
+
+        Args:
+            subject: fitted law or drive.
+            values: fitted values by name.
+            largest: largest friction force in the data [N].
+            v: measured velocities [m/s].
+            turning: True for rates and moments.
+        """
+        whole, load = subject.drive or subject.law, subject.load
+        law = subject.close(values).law
+        if whole is None or load is None or largest is None or law is None or law.inputs:
+            return None  # with inputs, friction alone does not determine the loads of its levels
+        force = turned("N") if turning else "N"
+        levels = {n: p for n, p in parameters(whole).items() if p.role == "level"}
+        loads = {n: load if is_coefficient(p) else 1.0 for n, p in levels.items()}
+        speeds = np.quantile(np.abs(v), np.linspace(0.05, 1.0, SPEEDS))
+        both = np.concatenate([-speeds, speeds])
+        known = {n: loads[n] for n, p in levels.items() if p.unit in ("1", force)}
+        return cls(known, largest, force, float(np.abs(steady_force(law, both, load)).max()))
 
     def beyond(self, values: Mapping[str, float]) -> Iterator[tuple[str, str]]:
         """Yield the name of each level far above all forces, with a message."""
@@ -150,7 +183,7 @@ def covariance(found: Minimum, levels: Levels | None = None) -> Covariance:
     wanders = np.abs(moved * size[:, None]).max(axis=1, initial=0.0) > 1e-4
     size_of = np.abs(found.slope)  # a value at its upper bound moves by rounding with its partner
     fixed = ~np.any((size_of > ROUNDING * size_of.max(axis=1, keepdims=True)) & ~found.held, axis=1)
-    matrix, white = (_without(C, wanders | fixed) for C in (inside.coloured, inside.white))
+    matrix, white = (without(C, wanders | fixed) for C in (inside.coloured, inside.white))
     low, high = _intervals(found, np.sqrt(np.diag(matrix)), inside.freedom)
     mine = tuple(names[i] for i in own)
     change = partial(_change, found, own)
@@ -171,8 +204,8 @@ def covariance(found: Minimum, levels: Levels | None = None) -> Covariance:
     out = np.array([name in notes for name in names], dtype=bool)
     return Covariance(
         names=names,
-        matrix=_without(matrix, out),
-        white=_without(white, out),
+        matrix=without(matrix, out),
+        white=without(white, out),
         freedom=inside.freedom,
         low=np.where(out, np.nan, low),
         high=np.where(out, np.nan, high),
@@ -184,7 +217,7 @@ def covariance(found: Minimum, levels: Levels | None = None) -> Covariance:
     )
 
 
-def _without(matrix: Array, out: NDArray[np.bool_]) -> Array:
+def without(matrix: Array, out: NDArray[np.bool_]) -> Array:
     """Return a matrix with the rows and columns in `out` set to NaN."""
     return np.where(out[:, None] | out, np.nan, matrix)
 

@@ -20,7 +20,7 @@ import numpy as np
 
 from identification.residuals.evaluation import Array
 from identification.solving.task import Point, Task
-from identification.verdict.covariance import LINEAR, Covariance, bend
+from identification.verdict.covariance import LINEAR, Covariance, bend, without
 from identification.verdict.profile import Walk
 
 BENT = 0.1
@@ -120,11 +120,10 @@ def _without(found: Covariance, name: str, there: Point, unit: str) -> Covarianc
 def _none(found: Covariance, lost: list[str], text: str) -> Covariance:
     """Return `found` without intervals and errors of the values in `lost`."""
     out = np.array([n in lost for n in found.names])
-    both = out[:, None] | out
     return replace(
         found,
-        matrix=np.where(both, np.nan, found.matrix),
-        white=np.where(both, np.nan, found.white),
+        matrix=without(found.matrix, out),
+        white=without(found.white, out),
         low=np.where(out, np.nan, found.low),
         high=np.where(out, np.nan, found.high),
         sentences=(*found.sentences, text),

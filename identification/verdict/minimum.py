@@ -13,8 +13,8 @@ from typing import NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.residuals.evaluation import Array, Blocks, Channel, Extended
-from identification.solving.task import Point, Task, influence
+from identification.residuals.evaluation import Array, Blocks, Channel, Extended, influence
+from identification.solving.task import Point, Task
 from identification.unknowns.spec import Unknown
 from identification.verdict.colour import Colour, Count, colour
 

@@ -11,8 +11,7 @@ from typing import Any
 import typer
 
 from identification.data.dataset import Dataset
-from identification.fit import Fit
-from identification.from_data import findings_of
+from identification.fit import Fit, findings_of
 from identification.residuals.closed_loop import ClosedLoop
 from identification.residuals.inverse import InverseDynamics
 from identification.residuals.points import Points

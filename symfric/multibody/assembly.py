@@ -24,7 +24,7 @@ from symfric.foundation.variable import at_start, stacked, symbols_of
 from symfric.laws.catalogue import law_name
 from symfric.laws.composed.isotropic import SpatialSlip
 from symfric.model import Contact, Model, Monitor, Output, Variables, kinds
-from symfric.model.holonomic import Holonomic, Inner
+from symfric.model.parts import Holonomic, Inner
 from symfric.multibody.applied import Rest, rests, solve_mass
 from symfric.multibody.contact import depends_on_load
 from symfric.multibody.equations import Equations, normals_with

@@ -20,7 +20,7 @@ from symfric.foundation.shown import data_uri
 from symfric.foundation.style import EDGE, colour
 from symfric.foundation.units import readable
 from symfric.foundation.variable import stacked
-from symfric.model.sketch import Sketch
+from symfric.model.parts import Sketch
 from symfric.results.kinds import friction_laws
 from symfric.results.signals import Signals
 from symfric.results.strokes import AZIMUTH, ELEVATION, Poses, Stroke, View, look, strokes

@@ -14,7 +14,7 @@ from identification.data.record import LONG
 from identification.residuals import inverse
 from identification.residuals.inverse import InverseRows
 from identification.residuals.points import PointRows
-from identification.result.live import expanded
+from identification.result.parts import expanded
 from symfric.foundation.status import Status
 
 Array = NDArray[np.float64]

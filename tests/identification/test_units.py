@@ -94,12 +94,14 @@ def assert_same(kind: Any, law: str, data: Dataset, some: list[Sizes], **given: 
 
 def test_units_of_points_do_not_matter() -> None:
     for law in ("stribeck", "hollars"):
-        assert_same(Points(), law, of_law(law, False), UNITS[::2])
+        assert_same(Points(), law, of_law(law, False), UNITS[::2], starts=1)
 
 
 def test_units_of_a_force_balance_do_not_matter() -> None:
-    data = synthetic_drive_data(seed=1).between(0.0, 8.0)
-    assert_same(InverseDynamics(), "stribeck", data, UNITS[::3], starts=1)
+    """Of exact positions: the correction of their noise ends within 1 % of an interval."""
+    slow: Any = {"rate": 500.0, "speeds": (0.004, 0.02, 0.08), "position_noise": 1e-10}
+    some = [(1e-9, 1e9, 1.0), (1.0, 1.0, 1e9)]
+    assert_same(InverseDynamics(), "stribeck", synthetic_drive_data(seed=1, **slow), some, starts=1)
 
 
 def test_positive_numbers_below_a_smallest_bound_are_parameters() -> None:

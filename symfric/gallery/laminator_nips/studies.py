@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from identification import Dataset, Fit, Points, six_steps
-from identification.starts.six_steps import standard_errors
+from identification.starts.experiments import standard_errors
 from identification.starts.stribeck import StribeckCurve
 from symfric import SteadyStateLuGre
 from symfric.foundation.numeric import Array

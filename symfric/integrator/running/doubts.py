@@ -34,13 +34,12 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.foundation.memory import remember
 from symfric.foundation.numeric import Array
 from symfric.foundation.status import EnergyWarning, OverloadWarning
 from symfric.foundation.variable import strays, symbols_of
 from symfric.integrator.compiled.columns import Columns
 from symfric.integrator.equations.inputs import InputData
-from symfric.integrator.running.integrator import Integrator
+from symfric.integrator.running.integrator import Integrator, remember
 from symfric.integrator.running.record import Run
 from symfric.model import Model
 from symfric.model.contact import APPLIED, Contact

@@ -2,15 +2,34 @@
 
 import numpy as np
 import pytest
-from made_up_gms import LAW, NOISE, gms_data
 
+from identification.data.dataset import Dataset
 from identification.data.synthetic import synthetic_drive_data
 from identification.fit import Fit
 from identification.residuals.closed_loop import ClosedLoop
 from identification.residuals.shooting import Shooting
 from identification.unknowns.subject import subject
+from symfric import GMS, simulate
 from symfric.foundation.status import Status
+from symfric.integrator import Linear
 from symfric.scenes import Drive
+
+LAW = GMS(mu_s=1.2, mu_d=1.0)
+NOISE = 2e-7
+"""Standard deviation of the position [m]."""
+
+
+def gms_data() -> Dataset:
+    """Pre-sliding loops within loops, then sliding with reversals; 1 kHz, 0.6 s, mass 1 kg."""
+    t = np.arange(0.0, 0.6, 1e-3)
+    force = 0.9 * np.sin(2 * np.pi * 8 * t) * np.minimum(1, 0.3 + 2 * t)
+    force = force + 0.35 * np.sin(2 * np.pi * 41 * t) + 0.9 * (t > 0.45) * np.sin(60 * (t - 0.45))
+    run = simulate(
+        Drive(LAW, m=1.0, N=1.0).model(), float(t[-1]), t_eval=t, rtol=1e-8,
+        u={"force": Linear(t, force)},
+    )  # fmt: skip
+    x = run["x"] + NOISE * np.random.default_rng(0).standard_normal(t.size)
+    return Dataset.of(t=t, x=x, force=force, units={"x": "m", "force": "N"}, name="gms")
 
 
 def test_the_law_that_made_the_data_is_believed_and_another_one_is_not() -> None:

@@ -9,7 +9,7 @@ from fits import TRUTH, make, record
 from identification.data.dataset import Dataset
 from identification.result.fitted import Fitted
 from identification.result.outcome import interval, percent, rounded, text_of
-from identification.result.series import Estimate
+from identification.result.parts import Estimate
 from symfric.foundation.status import Status
 from symfric.laws import Stribeck
 from symfric.model import Model

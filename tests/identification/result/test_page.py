@@ -8,9 +8,9 @@ import pytest
 from fits import make
 
 from identification.data.findings import Finding
+from identification.result.build import cut_envelope, envelope
 from identification.result.fitted import Fitted
 from identification.result.page import page_of
-from identification.result.series import cut_envelope, envelope
 
 NASTY = '<img src=x onerror=alert(1)> & "quotes"'
 

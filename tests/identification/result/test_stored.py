@@ -18,7 +18,7 @@ from identification.residuals.shooting import Shooting
 from identification.result.build import written
 from identification.result.fitted import Fitted
 from identification.result.page import page_of
-from identification.result.series import Error, Errors, Line
+from identification.result.parts import Error, Errors, Line
 from identification.result.stored import from_data, plain, revived
 from identification.unknowns.spec import above, linear, log, tied
 from symfric import LuGre

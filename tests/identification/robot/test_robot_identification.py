@@ -6,8 +6,7 @@ from crane import COULOMB, NAMES, OFFSET, VISCOUS, log, newton_euler, urdf, wave
 
 from identification import Dataset, identify_robot, load_robot, robot_information
 from identification.data.filters import lowpass
-from identification.robot.base import base_of
-from identification.robot.consistent import pseudo_inertia
+from identification.robot.base import base_of, pseudo_inertia
 from identification.robot.dynamics import RobotModel
 
 TRUTH = {

@@ -12,10 +12,9 @@ import pytest
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-from identification.residuals.evaluation import Channel, Evaluation
-from identification.solving.descent import Start, descend
-from identification.solving.many_starts import best_of, is_white, many_starts
-from identification.solving.task import THRESHOLD, Task, objective, shaped, task, triangle
+from identification.residuals.evaluation import THRESHOLD, Channel, Evaluation, shaped
+from identification.solving.descent import Start, best_of, descend, many_starts
+from identification.solving.task import Task, is_white, objective, task, triangle
 from identification.unknowns.spec import Unknown
 from identification.unknowns.unknowns import unknowns_of
 from symfric.foundation.status import SolveError, Status

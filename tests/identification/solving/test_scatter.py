@@ -8,9 +8,8 @@ from identification.data.dataset import Dataset
 from identification.fit import Fit
 from identification.residuals.shooting import Shooting
 from identification.solving.descent import descend_easier_first
-from identification.solving.many_starts import REACH, scattered
 from identification.unknowns.spec import Unknown
-from identification.unknowns.unknowns import Unknowns, unknowns_of
+from identification.unknowns.unknowns import REACH, Unknowns, scattered, unknowns_of
 from symfric import Model, simulate
 from symfric.foundation.parameters import Variable
 from symfric.foundation.status import Status

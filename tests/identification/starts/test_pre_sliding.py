@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from identification.starts.experiments import break_away
 from identification.starts.maxwell_slip import Elements, _merged, fit_elements, stretches
-from identification.starts.measured import Measured, break_away, hysteresis, turning_points
+from identification.starts.measured import Measured, hysteresis, turning_points
 
 T = 0.015 * np.arange(1000)
 X = 8e-6 * np.sin(0.63 * T) + 5e-6 * np.sin(2.3 * T) + 15e-6 * np.sin(0.9 * T)

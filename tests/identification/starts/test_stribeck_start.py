@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from identification.starts.experiments import SixSteps, six_steps, standard_errors
 from identification.starts.measured import Measured
-from identification.starts.six_steps import SixSteps, six_steps, standard_errors
 from identification.starts.start import start_values
 from identification.starts.stribeck import StribeckCurve, binned, fit_curve
 from symfric.foundation.parameters import parameters, with_values

@@ -8,7 +8,7 @@ import pytest
 from linear_fits import STEP, Decay, ar1, coulomb, fitted, motion, solved
 
 from identification.data.findings import Finding, Findings
-from identification.solving.task import THRESHOLD
+from identification.residuals.evaluation import THRESHOLD
 from identification.unknowns.spec import Unknown
 from identification.verdict.covariance import Covariance, Levels, covariance
 from identification.verdict.judge import judge

@@ -1,4 +1,4 @@
-"""Six-step procedure for the static parameters of LuGre.
+"""Evaluation of experiments: break-away forces, and six steps to the static parameters of LuGre.
 
     F = F_C + (F_S - F_C) exp(-(v/v_s)^delta) + sigma_2 v
 
@@ -9,17 +9,21 @@
     5  F_C                    force of step 2 minus sigma_2 v_min of step 4
     6  delta, v_s             exponential part again, with a free exponent
 
-Each step uses only a part of the curve; a fit of all points at once (`identification.Fit`) has a
-smaller error. `doubts` lists the values that the points do not determine.
+Each of the six steps uses only a part of the curve; a fit of all points at once
+(`identification.Fit`) has a smaller error. `doubts` lists the values that the points do not
+determine.
 Source: A Friction Model for Laminator Nips, MSc thesis TFRT-5968, Lund 2015, section 4.2; after
 Olsson, Control Systems with Friction, PhD thesis, Lund 1996.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import final
 
 import numpy as np
 
+from identification.data.record import runs
+from identification.starts.measured import Measured
 from identification.starts.stribeck import Array, Curve, StribeckCurve, binned, samples
 from symfric.foundation import checks
 from symfric.laws.static.exponential import SteadyStateLuGre
@@ -255,3 +259,124 @@ def _no_fall(curve: Curve, top: int, low: int) -> str:
         f"{v[top]:.3g} m/s, and the smallest, {F[low]:.3g} N at {v[low]:.3g} m/s, shows how it "
         "falls; scatter may hide it: add points at these speeds, or use Fit with all points"
     )
+
+
+REST = 0.02
+"""Share of the largest speed below which a body counts as at rest."""
+SHORTEST = 5
+"""Smallest number of samples of a rest."""
+RISE = (0.3, 0.9)
+"""Shares of the break-away force between which the loading rate is evaluated."""
+APART = 2.0
+"""Smallest ratio of loading rates for which their effect is evaluated."""
+
+
+@final
+@dataclass(frozen=True)
+class BreakAway:
+    """A break-away event.
+
+    Attributes:
+        t: time of the largest force [s].
+        force: largest force, in the direction of the subsequent motion [N].
+        rate: loading rate before that time [N/s].
+        side: direction of the motion, 1 or -1.
+    """
+
+    t: float
+    force: float
+    rate: float
+    side: int
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class BreakAways:
+    """Break-away events of a data set.
+
+    Attributes:
+        events: events in order of time.
+        level: median force of both directions [N].
+        scatter: median absolute deviation of the force, relative to its median.
+        per_decade: change of the force per decade of the loading rate [N], by linear regression on
+            the logarithm of the rate; None if the rates differ by less than a factor of 2.
+        error: standard error of `per_decade` [N].
+    """
+
+    events: tuple[BreakAway, ...]
+    level: float
+    scatter: float
+    per_decade: float | None
+    error: float
+
+    @property
+    def note(self) -> str:
+        """Message about the effect of the loading rate."""
+        rates = [event.rate for event in self.events]
+        span = f"{min(rates):.3g} to {max(rates):.3g} N/s"
+        if self.per_decade is None:
+            return f"all loading rates are similar ({span}): their effect on the force is unknown"
+        if abs(self.per_decade) < 2 * self.error:
+            return f"no effect of the loading rate is visible ({span})"
+        word = "decreases" if self.per_decade < 0 else "increases"
+        return (
+            f"the force {word} by {abs(self.per_decade):.3g} +- {self.error:.2g} N for each factor "
+            f"of ten of the loading rate ({span}): use the slowest ramps for the static level"
+        )
+
+
+def break_away(measured: Measured, *, rest: float = REST, offset: float = 0.0) -> BreakAways:
+    """Find the break-away forces of all ramps in a record.
+
+    A rest is an interval of at least 5 samples below `rest` times the largest speed that ends in
+    motion. The break-away force is the largest force in the direction of that motion during the
+    rest. The samples must resolve the rise of the force; otherwise the maximum is missed.
+
+    Args:
+        measured: samples with times; the force excludes inertia, or the ramps are slow.
+        rest: share of the largest speed.
+        offset: constant force [N] in addition to friction.
+
+    Raises:
+        ValueError: no times, or no rest that ends in motion.
+    """
+    rest = checks.number("break_away: rest", rest, above=0.0, upper=0.9)
+    if measured.t is None:
+        raise ValueError("break_away: expected a record with times, got points; pass t=")
+    events = tuple(e for r in measured.records for e in _events(measured, r, rest, offset))
+    if not events:
+        raise ValueError(
+            f"break_away: expected a rest of at least {SHORTEST} samples below {rest:g} of the "
+            "largest speed that ends in motion, got none"
+        )
+    forces = np.array([event.force for event in events])
+    level = float(np.median(forces))
+    scatter = float(np.median(np.abs(forces - level))) / abs(level)
+    decades = np.log10([event.rate for event in events])
+    if len(events) < 3 or np.ptp(decades) < np.log10(APART):
+        return BreakAways(events, level, scatter, None, 0.0)
+    X = np.column_stack([np.ones(decades.size), decades])
+    w, *_ = np.linalg.lstsq(X, forces, rcond=None)
+    spread = float(np.sum((forces - X @ w) ** 2)) / (decades.size - 2)
+    error = float(np.sqrt(spread * np.linalg.inv(X.T @ X)[1, 1]))
+    return BreakAways(events, level, scatter, float(w[1]), error)
+
+
+def _events(measured: Measured, record: slice, rest: float, offset: float) -> Iterator[BreakAway]:
+    t, v, F = np.asarray(measured.t)[record], measured.v[record], measured.F[record] - offset
+    for begin, end in runs(np.abs(v) < rest * measured.fastest):
+        if end - begin < SHORTEST or end >= v.size:
+            continue
+        side = int(np.sign(v[end]))
+        ramp = side * F[begin : end + 1]
+        top = int(np.argmax(ramp))
+        if top == 0 or ramp[top] <= 0:
+            continue
+        low, high = (share * ramp[top] for share in RISE)
+        below = np.flatnonzero(ramp[:top] <= low)
+        rise = slice(below[-1] + 1 if below.size else 0, top)  # the last rise
+        times, force = t[begin : begin + top][rise], ramp[rise]
+        rising = force < high
+        rate = float(np.polyfit(times[rising], force[rising], 1)[0]) if rising.sum() > 1 else 0.0
+        if rate > 0:
+            yield BreakAway(float(t[begin + top]), float(ramp[top]), rate, side)
