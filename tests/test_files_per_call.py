@@ -65,7 +65,7 @@ MOST = {
     "simulate, first": 31,
     "simulate, second": 14,
     "Fit.solve": 51,
-    "ocp.solve": 93,
+    "ocp.solve": 90,
     "generate": 30,
 }
 
