@@ -189,8 +189,8 @@ def equations(
     normals = tuple(c.normal(kin, pressing) for c in contacts)
     potential = sum((f.energy(kin) for f in forces), ca.SX(0))
     return Equations(
-        kin, tuple(forces), applied, loops, held, tuple(turns.values()), norms.numel(), q, qd, a, lam,
-        stacked(c.F for c in contacts), ca.densify(phi), phi_dot, phi_ddot, ca.densify(rows),
+        kin, tuple(forces), applied, loops, held, tuple(turns.values()), norms.numel(), q, qd, a,
+        lam, stacked(c.F for c in contacts), ca.densify(phi), phi_dot, phi_ddot, ca.densify(rows),
         contacts, normals, kinetic_energy(kin), potential, reactions, pressing,
     )  # fmt: skip
 
