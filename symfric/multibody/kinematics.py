@@ -7,6 +7,7 @@ from typing import NamedTuple, final
 import casadi as ca
 import numpy as np
 
+from symfric.foundation.numeric import nonzeros
 from symfric.foundation.parameters import Variable
 from symfric.foundation.variable import stacked
 from symfric.model.kinds import POSITION
@@ -47,7 +48,7 @@ class Cuts:
     def __call__(self, link: int, expression: ca.SX) -> ca.SX:
         """Return `expression` with entries other than numbers and symbols replaced by symbols."""
         cut = ca.SX(expression)
-        for k, value in enumerate(cut.nonzeros()):
+        for k, value in enumerate(nonzeros(cut)):
             if not (value.is_constant() or value.is_symbolic()):
                 symbol = ca.SX.sym(f"l_{len(self.links)}")
                 self._symbols.append(symbol)

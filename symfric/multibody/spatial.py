@@ -27,7 +27,7 @@ Vector = Sequence[Any] | ca.SX | ca.DM
 
 def vector(values: Vector) -> ca.SX:
     """Return `values` as a column (3, 1)."""
-    rows = [values[i] for i in range(3)]
+    rows: list[Any] = [values[i] for i in range(3)]
     return ca.SX(rows) if all(type(row) is float for row in rows) else stacked(rows)
 
 

@@ -22,7 +22,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.foundation.numeric import Array, reciprocal
+from symfric.foundation.numeric import Array, nonzeros, reciprocal
 
 Order = tuple[tuple[int, int], ...]
 """(row, column) of each pivot, in the order of elimination."""
@@ -125,7 +125,7 @@ def factorise(matrix: ca.SX, groups: Sequence[Sequence[int]] = (), order: Order 
     n = matrix.size1()
     rows: list[dict[int, ca.SX]] = [{} for _ in range(n)]
     holders: list[set[int]] = [set() for _ in range(n)]
-    entries = zip(*matrix.sparsity().get_triplet(), matrix.nonzeros(), strict=True)
+    entries = zip(*matrix.sparsity().get_triplet(), nonzeros(matrix), strict=True)
     for i, j, entry in entries:
         rows[i][j] = entry
         holders[j].add(i)
