@@ -58,7 +58,7 @@ def steady(law: Law) -> ca.Function:
     return ca.Function("steady", [motion, symbols_of(chosen)], [ca.densify(ca.SX(force))])
 
 
-def _ahead(law: Law, v: ca.SX, given: Iterable[ca.SX]) -> dict[str, ca.SX]:
+def _ahead(law: Law, v: ca.SX, given: Iterable[ca.SX]) -> dict[str, Any]:
     """Return the further inputs, which point in the direction of sliding if the law is odd."""
     ahead = smooth.sign(v, 0.0) if law.facts.odd else 1.0
     return {i.name: value * ahead for i, value in zip(law.inputs, given, strict=True)}
@@ -77,7 +77,8 @@ def loop(law: Law) -> Model:
     given = [Variable(f"in_{i.name}", i.unit, i.steady) for i in law.inputs]
     t = ca.SX.sym("t")
     v = A.symbol * omega.symbol * ca.cos(omega.symbol * t)
-    inputs = _ahead(law, v, [u.symbol for u in given]) | {"dv": ca.jacobian(v, t)}
+    inputs = _ahead(law, v, [u.symbol for u in given])
+    inputs["dv"] = ca.jacobian(v, t)
     slip = contact("slide", symbolic, v, N.symbol, rest={}, **inputs)
     first = law.steady_state(0.0, NORMAL_FORCE)
     states = tuple(replace(s, start=float(first[k])) for k, s in enumerate(slip.states))
