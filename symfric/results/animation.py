@@ -1,30 +1,30 @@
 """Animations and still figures of mechanisms."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
-from string import Template
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
-from matplotlib.animation import FFMpegWriter, PillowWriter
+from matplotlib.animation import FFMpegWriter
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from symfric.foundation import checks
-from symfric.foundation.files import write_text, written
+from symfric.foundation.files import written
 from symfric.foundation.numeric import Array
 from symfric.foundation.panels import blank, grid
-from symfric.foundation.shown import data_uri
 from symfric.foundation.style import EDGE, colour
 from symfric.foundation.units import readable
 from symfric.foundation.variable import stacked
 from symfric.model.sketch import Sketch
+from symfric.results.films import pictures, write_gif, write_page
 from symfric.results.kinds import friction_laws
 from symfric.results.signals import Signals
 from symfric.results.strokes import AZIMUTH, ELEVATION, Poses, Stroke, View, look, strokes
 
+Frame = TypeVar("Frame")
 ENDINGS = (".gif", ".html", ".mp4")
 Flags = NDArray[np.bool_]
 BRIEF, LONG, SHOWN = 2.0, 12.0, 6.0
@@ -48,7 +48,7 @@ def animate(
     trajectory: Signals,
     path: str | Path,
     *,
-    fps: float = 20.0,
+    fps: float = 12.5,
     speed: float | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> None:
@@ -65,31 +65,23 @@ def animate(
     times, speed = frame_times(float(trajectory.t[0]), float(trajectory.t[-1]), fps, speed)
     figure, pose = picture(trajectory, times, speed)
 
-    def frames() -> Iterator[None]:
-        for k in range(times.size):
-            pose(k)
+    def told(frames: Iterable[Frame]) -> Iterator[Frame]:
+        for k, frame in enumerate(frames, start=1):
             if progress is not None:
-                progress((k + 1) / times.size)
-            yield
+                progress(k / times.size)
+            yield frame
 
-    if Path(path).suffix.lower() == ".html":
-        sources = ",\n".join(f'"{data_uri(figure, dpi=100)}"' for _ in frames())
-        player = Template(Path(__file__).with_name("player.html").read_text("utf-8"))
-        settings = {"pictures": sources, "last": times.size - 1, "wait": round(1000 / fps)}
-        write_text(path, player.substitute(settings))
+    ending = Path(path).suffix.lower()
+    if ending == ".mp4":
+        movie = FFMpegWriter(fps)  # type: ignore[arg-type]
+        with written(path) as temporary, movie.saving(figure, str(temporary), dpi=100):
+            for k in told(range(times.size)):
+                pose(k)
+                movie.grab_frame()
         return
-    with written(path) as temporary:
-        if Path(path).suffix.lower() == ".mp4":
-            movie = FFMpegWriter(fps)  # type: ignore[arg-type]
-            with movie.saving(figure, str(temporary), dpi=100):
-                for _ in frames():
-                    movie.grab_frame()
-        else:  # `saving` would write the film even after an interrupt
-            film = PillowWriter(fps)  # type: ignore[arg-type]
-            film.setup(figure, str(temporary), dpi=100)
-            for _ in frames():
-                film.grab_frame()
-            film.finish()
+    film = list(told(pictures(figure, pose, times.size)))
+    write = write_page if ending == ".html" else write_gif
+    write(path, film, fps)
 
 
 def check_format(path: str | Path) -> None:
@@ -127,10 +119,10 @@ def picture(
         ValueError: the model has no bodies.
     """
     model = trajectory.model
-    if model.sketch is None:
+    if model.sketch is None or model.sketch().still:
         raise ValueError(
             f"animation of '{trajectory.scene}': expected a machine with places, got a model "
-            "without a sketch; plot() shows its signals"
+            "without a sketch that moves; plot() shows its signals"
         )
     sketch = model.sketch()
     columns = trajectory.of(sketch.places, times).reshape(-1, 12, times.size)
@@ -260,7 +252,7 @@ def _added(figure: Figure, axes: Array, stroke: Stroke) -> Callable[[int], None]
     """Add a stroke to the figure, and return a function of k that draws it as in picture k."""
     points = np.einsum("ac,nck->kan", axes, stroke.points)
     canvas: Any = figure.axes[0]
-    (line,) = canvas.plot(*([] for _ in axes), **_style(stroke))
+    (line,) = canvas.plot(*([] for _ in axes), **style(stroke))
     place = line.set_data if len(axes) == 2 else line.set_data_3d
 
     def put(k: int) -> None:
@@ -279,7 +271,7 @@ def _direction(axis: Array) -> str:
     return "({:.2g}, {:.2g}, {:.2g})".format(*(axis.round(9) + 0.0))
 
 
-def _style(stroke: Stroke) -> dict[str, Any]:
+def style(stroke: Stroke) -> dict[str, Any]:
     """Return the style keywords of a stroke."""
     shade = colour(stroke.body) if stroke.body >= 0 else EDGE
     styles: dict[str, dict[str, Any]] = {
@@ -293,7 +285,7 @@ def _style(stroke: Stroke) -> dict[str, Any]:
         "ground": {"color": GROUND, "linewidth": 3.0, "alpha": 0.6},
         "anchor": {"color": GROUND, "marker": "^", "markersize": 13.0, "linestyle": ""},
         "rod": {"color": EDGE, "linewidth": 1.8},
-        "damper": {"color": EDGE, "linewidth": 1.2, "linestyle": "--"},
+        "damper": {"color": EDGE, "linewidth": 1.2},
         "spring": {"color": "#7f7f7f", "linewidth": 1.0},
         "joint": {"color": EDGE, "marker": stroke.marker, "linestyle": "", "markeredgewidth": 1.6,
                   "markersize": 4.0 if stroke.sticks is None else 9.0,
