@@ -37,7 +37,8 @@ class Symbol:
     Attributes:
         marker: shape of the marker at b; empty for no marker.
         line: line from a to b: "rod", "spring", "damper", or "strut" for a spring and a damper;
-            "circle" about a through b; empty for no line.
+            "circle" about a through b, "spiral" for a torsion spring at b, "link" for a gear or a
+            belt; empty for no line.
         axes: lines through b along axes of a or b, each given as ("a" or "b", number of the axis).
         hinge: True for a pure rotation about z of b.
         guide: True for sliding along z of a.

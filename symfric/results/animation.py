@@ -1,4 +1,4 @@
-"""Animations and still figures of mechanisms."""
+"""Animations of mechanisms."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
@@ -31,8 +31,8 @@ BRIEF, LONG, SHOWN = 2.0, 12.0, 6.0
 """Motions between BRIEF and LONG [s] are shown in real time, other motions in SHOWN [s]."""
 INSIDE = np.array([[0.01, 0.01], [0.99, 0.94]])
 """Corners of the part of a figure that contains spatial axes and their labels."""
-SIZE, SMALL = 6.4, 3.2
-"""Larger side of the panel of an animation and of a small figure [inch]."""
+SIZE = 6.4
+"""Larger side of the panel of an animation [inch]."""
 PATH = 1001
 """Number of points in the path of a centre of mass."""
 STICKS, SLIDES = colour(1), "white"
@@ -156,18 +156,8 @@ def picture(
     return figure, show
 
 
-def still(sketch: Sketch, places: Array) -> Figure:
-    """Return a small figure of a sketch, given its places, shape (12, k)."""
-    columns = places.T[:, :, None]
-    centres = columns[[part.centre for part in sketch.parts], 9:]
-    figure, drawn = _drawn(sketch, columns, centres, {}, SMALL)
-    for put in drawn:
-        put(0)
-    return figure
-
-
 def _drawn(
-    sketch: Sketch, columns: Array, paths: Array, sticks: Mapping[str, Flags], size: float = SIZE
+    sketch: Sketch, columns: Array, paths: Array, sticks: Mapping[str, Flags]
 ) -> tuple[Figure, list[Callable[[int], None]]]:
     """Return a figure, and a function of k for each stroke that draws it as in picture k.
 
@@ -176,11 +166,10 @@ def _drawn(
         columns: axes and positions of the places in each picture, shape (places, 12, pictures).
         paths: centres of the parts, shape (parts, 3, times).
         sticks: flags by joint, True in pictures where its contacts stick.
-        size: larger side of the panel [inch].
     """
     poses = Poses(columns[:, :9].reshape(-1, 3, 3, columns.shape[2]), columns[:, 9:], paths)
     view = look(sketch, poses)
-    figure, axes = _flat(view, size) if view.planar else _spatial(view, size)
+    figure, axes = _flat(view) if view.planar else _spatial(view)
     return figure, [_added(figure, axes, s) for s in strokes(sketch, poses, view, sticks)]
 
 
@@ -198,7 +187,7 @@ def _sticks(trajectory: Signals, sketch: Sketch, times: Array) -> dict[str, Flag
     }
 
 
-def _flat(view: View, size: float) -> tuple[Figure, Array]:
+def _flat(view: View) -> tuple[Figure, Array]:
     """Return a figure that shows a plane along its normal, and the projection to its axes."""
     axes = np.stack([view.right, view.up])
     low, high = axes @ view.low, axes @ view.high
@@ -209,7 +198,7 @@ def _flat(view: View, size: float) -> tuple[Figure, Array]:
     width, height = high - low
     factor, unit = readable("m", [low, high])
     low, high = factor * low, factor * high
-    scale = size / max(width, height)
+    scale = SIZE / max(width, height)
     figure, ((ax,),) = grid(1, 1, scale * width + 0.9, scale * height + 0.9)
     ax.set_aspect("equal")
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
@@ -217,9 +206,9 @@ def _flat(view: View, size: float) -> tuple[Figure, Array]:
     return figure, factor * axes
 
 
-def _spatial(view: View, size: float) -> tuple[Figure, Array]:
+def _spatial(view: View) -> tuple[Figure, Array]:
     """Return a figure with three axes of equal scale, and the projection to its axes."""
-    figure = blank(1.125 * size, size, free=True)
+    figure = blank(1.125 * SIZE, SIZE, free=True)
     ax: Any = figure.add_subplot(projection="3d", proj_type="ortho")
     extent = view.high - view.low
     extent = np.maximum(extent, 0.15 * extent.max())
@@ -286,6 +275,7 @@ def style(stroke: Stroke) -> dict[str, Any]:
         "anchor": {"color": GROUND, "marker": "^", "markersize": 13.0, "linestyle": ""},
         "rod": {"color": EDGE, "linewidth": 1.8},
         "damper": {"color": EDGE, "linewidth": 1.2},
+        "link": {"color": EDGE, "linewidth": 1.4, "linestyle": "--"},
         "spring": {"color": "#7f7f7f", "linewidth": 1.0},
         "joint": {"color": EDGE, "marker": stroke.marker, "linestyle": "", "markeredgewidth": 1.6,
                   "markersize": 4.0 if stroke.sticks is None else 9.0,

@@ -38,8 +38,8 @@ class Stroke(NamedTuple):
     """Line or markers in all pictures.
 
     Attributes:
-        role: body, arm (to the end of a spring), path, block, axis, guide, rod, spring, damper,
-            ground (a guide fixed to the ground), anchor, centre, or joint.
+        role: body, arm (to the end of a spring), path, block, axis, guide, rod, link, spring,
+            damper, ground (a guide fixed to the ground), anchor, centre, or joint.
         points: points of the line, shape (n, 3, pictures); NaN interrupts the line.
         body: number of the body, which selects the colour; -1 if the stroke belongs to no body.
         marker: marker of a joint.
@@ -119,6 +119,8 @@ def _normal(sketch: Sketch, poses: Poses) -> Array | None:
         aside = _aside(directions[:, 0] if extent[0] > 0 else np.array([1.0, 0.0, 0.0]))
         normal = directions[:, 2] if extent[1] > FLAT * extent[0] else aside
     across = [np.linalg.norm(np.cross(axis.T, normal), axis=1).max() for axis in hinges]
+    slides = [poses.axes[m.a, 2] for m in sketch.marks if m.symbol.guide or m.symbol.slot]
+    across += [float(np.abs(normal @ axis).max()) for axis in slides]
     beyond = np.abs(normal @ moved).max() > FLAT * max(extent[0], 1e-300)
     if beyond or max(across, default=0.0) > FLAT:
         return None
@@ -189,7 +191,7 @@ def _behind(mark: Mark, poses: Poses, view: View) -> Iterator[Stroke]:
 
 
 def _line(line: str, a: Array, b: Array, view: View) -> Iterator[Stroke]:
-    """Yield a spring, a damper, both side by side, a circle, or a rod between two points."""
+    """Yield the line of an element between two points; see `Symbol`."""
     aside = 1.4 * view.size * _aside_of(b - a, view) if line == "strut" else np.zeros_like(a)
     if line in ("spring", "strut"):
         yield Stroke("spring", _zigzag(a + aside, b + aside, view))
@@ -202,8 +204,13 @@ def _line(line: str, a: Array, b: Array, view: View) -> Iterator[Stroke]:
         angles = np.linspace(0.0, 2 * np.pi, 73)[:, None, None]
         yield Stroke("rod", a + np.cos(angles) * (b - a) + np.sin(angles) * np.cross(
             (b - a).T, view.eye).T)  # fmt: skip
-    if line == "rod":
-        yield Stroke("rod", np.stack([a, b]))
+    if line == "spiral":
+        angles = np.linspace(0.0, 5 * np.pi, 91)[:, None]
+        turn = np.cos(angles) * view.right + np.sin(angles) * view.up
+        growing = np.linspace(0.5, 2.6, 91)[:, None] * view.size * turn
+        yield Stroke("spring", b + growing[:, :, None])
+    if line in ("rod", "link"):
+        yield Stroke(line, np.stack([a, b]))
 
 
 def _symbol(mark: Mark, poses: Poses, view: View) -> Iterator[Stroke]:
