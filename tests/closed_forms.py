@@ -11,9 +11,9 @@ import numpy as np
 from symfric import Model, Variable
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.equations.system import System, system
+from symfric.integrator.methods.attempt import build_dense_step, build_fixed
 from symfric.integrator.methods.method import Method
 from symfric.integrator.running.record import Dense
-from symfric.integrator.step.attempt import build_dense_step, build_fixed
 
 T = 1.0
 """End time of every measurement [s]."""

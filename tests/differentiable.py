@@ -3,7 +3,7 @@
 import casadi as ca
 
 from symfric import Model, Output, Variable
-from symfric.model.holonomic import Holonomic
+from symfric.model.parts import Holonomic
 
 
 def oscillator() -> Model:

@@ -1,10 +1,13 @@
 """Hybrid machines: equations with a mode that events switch."""
 
+from functools import cache
+
 import casadi as ca
 
 from symfric import Event, Model, Variable
 
 
+@cache
 def ball(e: float) -> Model:
     """A ball falls from 1 m and bounces with restitution e."""
     x, v = Variable("x", "m", start=1.0), Variable("v", "m/s")
@@ -12,6 +15,7 @@ def ball(e: float) -> Model:
     return Model("ball", x=(x, v), ode=ca.vertcat(v.symbol, -9.81), events=(bounce,))
 
 
+@cache
 def coulomb_on_a_belt(
     m: float, k: float, v_belt: float, g: float, mu_s: float, mu_d: float
 ) -> Model:

@@ -31,7 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from docs.machine.pages import ROOT, agrees, blocks, run, written_pages
-from symfric.integrator.step.attempt import Given
+from symfric.integrator.methods.attempt import Given
 
 SAFETY = 0.5
 """A value that moved by more than this share of what would change its last digit is reported."""

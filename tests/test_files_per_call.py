@@ -62,10 +62,10 @@ print(files(lambda: generate(LuGre(), "c")))
 
 
 MOST = {
-    "simulate, first": 33,
-    "simulate, second": 15,
+    "simulate, first": 31,
+    "simulate, second": 14,
     "Fit.solve": 51,
-    "ocp.solve": 93,
+    "ocp.solve": 90,
     "generate": 30,
 }
 

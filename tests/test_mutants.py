@@ -25,6 +25,6 @@ def test_a_mutant_changes_neither_messages_nor_annotations() -> None:
 
 def test_tests_of_a_file_are_in_the_folder_that_mirrors_it() -> None:
     assert mutants.nearest("symfric/laws/static/coulomb.py") == "tests/symfric/laws"
-    step = "tests/symfric/integrator/step"
-    assert mutants.nearest("symfric/integrator/step/attempt.py") == step
+    step = "tests/symfric/integrator/methods"
+    assert mutants.nearest("symfric/integrator/methods/attempt.py") == step
     assert mutants.nearest("ocp/solve.py") == "tests/ocp"

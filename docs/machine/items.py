@@ -14,7 +14,16 @@ from symfric import ALL_LAWS, POPULATIONS, BrownMcPhee, Exact, Table, law_name, 
 from symfric.cli.laws import costs
 from symfric.figures.data import phenomena
 from symfric.foundation.parameters import options
-from symfric.laws import PHENOMENA, AnyLaw, Asymmetric, LoadDependent, PlanarSlip, SpatialSlip, Sum
+from symfric.laws import (
+    PHENOMENA,
+    AnyLaw,
+    Asymmetric,
+    LoadDependent,
+    PlanarSlip,
+    Population,
+    SpatialSlip,
+    Sum,
+)
 from symfric.laws.composed.populations import cost
 from symfric.laws.composed.wrap import Lagged, LoadNormalised, TemperatureDependent
 from symfric.scenes import ALL_SCENES, Scene
@@ -111,6 +120,7 @@ def law_page(name: str, law: AnyLaw) -> str:
     text += f"The name on the command line is `{name}`. In Python, use "
     text += f"`from symfric import {kind.__name__}`.\n\n"
     text += directive("figure", f"/made/laws/{name}.png", alt=f"{name} with default parameters")
+    text += sliders_of(name, law)
     facts = [
         ["shows", ", ".join(PHENOMENA[code] for code in phenomena(law))],
         ["smoothness", law.facts.smoothness],
@@ -142,6 +152,15 @@ def law_page(name: str, law: AnyLaw) -> str:
     if type(law) in ALL_LAWS.values() and not getattr(law, "inputs", ()):
         lines.append(f"$ symfric run rabinowicz --law {name} --plot run.png")
     return text + "## Use\n\n" + block("\n".join(lines), "console")
+
+
+def sliders_of(name: str, law: AnyLaw) -> str:
+    """Return the section with the sliders of a law, or the reason why it has none."""
+    said = TEXTS["sliders"]
+    if isinstance(law, Population):
+        return f"{said['population']}\n\n"
+    raw = directive("raw", "html", file=f"../made/sliders/{name}.html")
+    return f"## {said['title']}\n\n{said['text']}{raw}"
 
 
 def signature(kind: type[Any]) -> str:

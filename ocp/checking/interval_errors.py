@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ocp.checking.resimulate import Arc
-from ocp.solving.optimum import cost_weight
 from ocp.transcription.blocks import Array, Block, Entries, Indices, Piece
-from ocp.transcription.program import Iterate
+from ocp.transcription.program import Iterate, cost_weight
 from ocp.transcription.schemes import Coefficients, Radau
 from ocp.transcription.transcribe import Transcription
 from symfric.foundation.parameters import Variable
@@ -298,7 +297,8 @@ def _slopes(transcription: Transcription, iterate: Iterate, number: int) -> tupl
         return np.zeros(shape), np.zeros(shape)
     piece, block = equations
     places = piece.places
-    lam, sigma = iterate.lam_g[piece.at], cost_weight(transcription, iterate.lam_g, number)
+    problem, largest = transcription.problem, transcription.skeleton.largest
+    lam, sigma = iterate.lam_g[piece.at], cost_weight(problem, largest, iterate.lam_g, number)
     v, theta = _at_places(piece, iterate.w, program.p, program.values)
     inputs = own.nodes.shape[0] + own.z.shape[0] + np.arange(shape[0])
     H_u, H_uu = np.zeros((shape[0], places)), np.zeros((shape[0], places))

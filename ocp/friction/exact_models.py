@@ -27,7 +27,7 @@ from symfric.laws.base import smooth
 from symfric.model import Contact, Event, Model, Output, kinds
 from symfric.model.contact import APPLIED
 from symfric.model.forces import with_forces
-from symfric.model.holonomic import Holonomic
+from symfric.model.parts import Holonomic
 from symfric.multibody.applied import Rest, forward
 from symfric.multibody.contact import JointContact
 from symfric.multibody.joint import JointFriction

@@ -28,7 +28,7 @@ import numpy as np
 from ocp.formulation.phase import Array
 from ocp.solving.motion import along_points, joined, sampled
 from ocp.transcription.blocks import Piece
-from ocp.transcription.program import Iterate
+from ocp.transcription.program import Iterate, cost_weight
 from ocp.transcription.transcribe import Transcription
 from ocp.transcription.unknowns import Points, SpanPoints
 
@@ -206,7 +206,7 @@ class Optimum:
         """Return L + E_t at the collocation points of a phase, or at the starts of intervals."""
         made, spans = self.transcription, self.transcription.problem.spans
         last = number - spans[number].phase + len(made.problem.chain)
-        weight = cost_weight(made, self.iterate.lam_g, number)
+        weight = cost_weight(made.problem, made.skeleton.largest, self.iterate.lam_g, number)
         total = self._along(number, spans[number].integrand)[0]
         for k in range(number, last):
             total = total + self._along(k, ca.jacobian(spans[k].end, spans[k].model.t), end=True)[0]
@@ -236,11 +236,3 @@ class Optimum:
 def _at_start(nodes: Array) -> Array:
     """Return the values at 0 of the polynomials through `nodes`."""
     return np.linalg.solve(np.vander(nodes, increasing=True).T, np.eye(nodes.size)[0])
-
-
-def cost_weight(transcription: Transcription, lam_g: Array, number: int) -> float:
-    """Return the weight of the cost of a phase in J; for "worst", the multiplier of its bound."""
-    problem, phases = transcription.problem, len(transcription.problem.chain)
-    if problem.kind == "worst":
-        return float(lam_g[transcription.skeleton.largest[number // phases]])
-    return phases / len(problem.spans) if problem.kind == "mean" else 1.0

@@ -25,7 +25,7 @@ from ocp.formulation.phase import Box, Span, fixed, initial, meet
 from ocp.transcription.blocks import Array, Block, Piece, Rows, block
 from ocp.transcription.unknowns import Grid, Local, SpanPoints
 from symfric.foundation.checks import listed
-from symfric.model.holonomic import Holonomic
+from symfric.model.parts import Holonomic
 
 RANK = 1e-8
 """Relative size below which a singular value counts as zero."""

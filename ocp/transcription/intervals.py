@@ -39,7 +39,7 @@ from symfric import integrator
 from symfric.foundation.parameters import Variable
 from symfric.foundation.programs import CompileError
 from symfric.foundation.variable import stacked
-from symfric.integrator.compiled.background import Prospect
+from symfric.integrator.compiled.columns import Prospect
 from symfric.integrator.compiled.compiler import library
 from symfric.model import Model
 

@@ -290,3 +290,18 @@ def outside(values: Array, lower: Array, upper: Array) -> Array:
 def worst_of(program: Program, w: Array, g: Array) -> float:
     """Return the largest violation of a row or of a bound of an unknown."""
     return float(outside(np.concatenate([w, g]), *program.bounds).max(initial=0.0))
+
+
+def cost_weight(problem: Problem, largest: Sequence[int], lam_g: Array, number: int) -> float:
+    """Return the weight of the cost of a phase in J; for "worst", the multiplier of its bound.
+
+    Args:
+        problem: the problem.
+        largest: indices of the rows that bound the costs of scenarios.
+        lam_g: multipliers of all rows.
+        number: index of the phase.
+    """
+    phases = len(problem.chain)
+    if problem.kind == "worst":
+        return float(lam_g[largest[number // phases]])
+    return phases / len(problem.spans) if problem.kind == "mean" else 1.0

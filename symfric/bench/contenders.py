@@ -20,17 +20,17 @@ import numpy as np
 from symfric import BrownMcPhee, Model, simulate
 from symfric.bench.report import FASTEST, compile_time
 from symfric.foundation.numeric import Array, bound
-from symfric.integrator.arguments import chosen
 from symfric.integrator.by_peer import peer
 from symfric.integrator.compiled.compiler import library
 from symfric.integrator.equations.initial import consistent, first_guess, first_step, smallest_step
 from symfric.integrator.equations.inputs import InputData, input_data
 from symfric.integrator.equations.system import System, system
+from symfric.integrator.methods.attempt import Given, State
+from symfric.integrator.prepared import chosen
 from symfric.integrator.running.events import Stop
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.record import Outputs
 from symfric.integrator.running.run import ATTEMPTS, Tolerances
-from symfric.integrator.step.attempt import Given, State
 from symfric.scenes import Rabinowicz
 
 Watched = tuple[str, ...]

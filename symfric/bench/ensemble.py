@@ -13,10 +13,10 @@ from symfric.integrator.cuda.device import Device, DeviceError
 from symfric.integrator.equations.initial import first_guess, first_step, smallest_step
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.many.members import program
+from symfric.integrator.methods.attempt import Given, State
 from symfric.integrator.methods.tableaux import ADAPTIVE
 from symfric.integrator.running.events import Stop
 from symfric.integrator.running.integrator import built
-from symfric.integrator.step.attempt import Given, State
 from symfric.scenes import FourBar, Pendulum, SliderCrank, rabinowicz
 
 RTOL, MOST = 1e-6, 10_000_000

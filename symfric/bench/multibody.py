@@ -17,9 +17,9 @@ from symfric.foundation.numeric import bound
 from symfric.foundation.programs import find_compiler
 from symfric.integrator.equations.initial import consistent, first_guess
 from symfric.integrator.equations.inputs import input_data
+from symfric.integrator.methods.attempt import Given, State
 from symfric.integrator.methods.tableaux import METHODS
 from symfric.integrator.running.integrator import Integrator
-from symfric.integrator.step.attempt import Given, State
 from symfric.multibody import JointFriction, Mechanism, Revolute
 from symfric.scenes import DoublePendulum, FourMass, MechanismScene, PendulumBox, SliderCrank
 

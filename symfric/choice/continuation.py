@@ -21,8 +21,8 @@ from symfric.choice.machine import FAILURES, Candidate, Reference
 from symfric.choice.smoothing import MARGIN, Smoothed, SmoothingStudy, study
 from symfric.figures.regularisation import Machine, Sample, apart
 from symfric.foundation.status import SolveError, Status
-from symfric.integrator.arguments import chosen
 from symfric.integrator.equations.inputs import input_data
+from symfric.integrator.methods.tableaux import chosen
 from symfric.integrator.running.integrator import built
 from symfric.model import Model
 from symfric.results.trajectory import Trajectory

@@ -27,9 +27,9 @@ from symfric.foundation.parameters import Variable, symbolise
 from symfric.laws.base import smooth
 from symfric.model import Contact, Model, Output
 from symfric.model.forces import opened
-from symfric.model.holonomic import Holonomic
 from symfric.model.kinds import WORK
 from symfric.model.model import check_model
+from symfric.model.parts import Holonomic
 from symfric.model.start import Put
 
 WHERE = "driven"

@@ -22,7 +22,7 @@ from symfric.integrator.simulate import simulate
 from symfric.laws.base import smooth
 from symfric.laws.base.law import FORCE, Law, require_law
 from symfric.model import Contact, Model
-from symfric.results.quadrature import integral_between
+from symfric.results.signals import integral_between
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -15,7 +15,7 @@ from symfric.dynamics.curve import Node, Step, located
 from symfric.dynamics.equations import Equations, tangent
 from symfric.dynamics.shooting import Linear, Shooting
 from symfric.foundation.numeric import Array
-from symfric.results.quadrature import extremes
+from symfric.results.signals import extremes
 
 TINY = 1e-300
 CROSSES = 0.9

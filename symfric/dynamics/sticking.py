@@ -14,7 +14,7 @@ from symfric.foundation.numeric import Array
 from symfric.foundation.status import SolveError
 from symfric.integrator import Trajectory, simulate
 from symfric.model import Contact
-from symfric.results.quadrature import extremes
+from symfric.results.signals import extremes
 
 GRAZES, NEARLY = 1e-3, 1e-2
 """Distances from sticking, relative to the largest sliding velocity, at which a branch ends, and up

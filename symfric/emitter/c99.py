@@ -1,4 +1,4 @@
-"""C99 text of CasADi's numbers, operations and expressions; comments, long lines and templates."""
+"""C99 and JavaScript text of CasADi's numbers, operations and expressions; comments, templates."""
 
 import math
 from collections.abc import Sequence
@@ -22,19 +22,21 @@ TERNARY, LOGIC, EQUAL, ORDER, SUM, PRODUCT, SIGN, ATOM = range(1, 9)
 
 @dataclass(frozen=True)
 class Real:
-    """Floating-point type of C.
+    """Floating-point type of C, or of JavaScript.
 
     Attributes:
         name: name in C.
         suffix: ending of the names of types and functions.
         letter: ending of literals and of the functions of math.h.
         size: size in bytes.
+        script: True for JavaScript, whose declarations have no type.
     """
 
     name: str
     suffix: str
     letter: str
     size: int
+    script: bool = False
 
     @property
     def kind(self) -> Any:
@@ -61,14 +63,29 @@ class Real:
                 + ", which would become 0" * vanishes
             )
         if math.isinf(value):
-            return f"{'-' if value < 0 else ''}HUGE_VAL{self.letter.upper()}"
+            huge = "Infinity" if self.script else f"HUGE_VAL{self.letter.upper()}"
+            return f"{'-' if value < 0 else ''}{huge}"
         if rounded == 0.0 or 1e-4 <= abs(rounded) < 1e7:
             return np.format_float_positional(rounded, trim="0") + self.letter
         return np.format_float_scientific(rounded, trim="0", exp_digits=1) + self.letter
 
+    def declared(self, logical: bool = False, *, constant: bool = False) -> str:
+        """Return the words before the name of a local, a number or a bool."""
+        if self.script:
+            return "const" if constant else "let"
+        return "const " * constant + ("bool" if logical else self.name)
+
+    def function(self, op: int) -> str:
+        """Return the name by which generated code calls the function of an operation."""
+        name = FUNCTIONS[op]
+        if self.script:
+            return SCRIPTED.get(name, f"Math.{name}")
+        return f"{name}{self.letter}" if op in CHEAP else macro(name, self)
+
 
 DOUBLE = Real("double", "f64", "", 8)
 FLOAT = Real("float", "f32", "f", 4)
+SCRIPT = Real("double", "js", "", 8, script=True)
 REALS = {real.name: real for real in (DOUBLE, FLOAT)}
 
 
@@ -120,14 +137,18 @@ TRANSCENDENTAL = {ca.OP_CONSTPOW: "pow"} | {
 
 FUNCTIONS = CHEAP | TRANSCENDENTAL
 
+SCRIPTED = {"fabs": "Math.abs"} | {
+    name: name for name in ("copysign", "erf", "fmod", "pow", "remainder")
+}
+"""Functions of math.h that JavaScript names otherwise, or has in `functions.js` only."""
+
 
 def form(op: int, arity: int, real: Real) -> Form:
-    """Return the C text of the operation `op` with `arity` operands."""
+    """Return the text of the operation `op` with `arity` operands."""
     if op in FORMS:
         return FORMS[op]
     operands = ", ".join(["{}"] * arity)
-    function = f"{FUNCTIONS[op]}{real.letter}" if op in CHEAP else macro(FUNCTIONS[op], real)
-    return Form(f"{function}({operands})", ATOM, (TERNARY,) * arity)
+    return Form(f"{real.function(op)}({operands})", ATOM, (TERNARY,) * arity)
 
 
 def macro(function: str, real: Real) -> str:

@@ -149,7 +149,8 @@ class _Body:
         for statement in self.plan.bodies[number]:
             for i in self._loaded(number, statement):
                 place = self.waiting.pop(i)
-                lines.append(f"const {self.real.name} {self.writer.names[i]} = {place};")
+                words = self.real.declared(constant=True)
+                lines.append(f"{words} {self.writer.names[i]} = {place};")
             lines += self.statement(statement)
         return lines
 
@@ -176,7 +177,8 @@ class _Body:
         match statement:
             case Local(node):
                 text = write.expression(node).text
-                return [f"const {self._kind(node)} {self._name(node)} = {text};"]
+                words = self.real.declared(write.logical[node], constant=True)
+                return [f"{words} {self._name(node)} = {text};"]
             case Branch():
                 return self._branch(statement)
             case Side(select, side):
@@ -200,7 +202,7 @@ class _Body:
     def _branch(self, branch: Branch) -> list[str]:
         placed, write = self.plan.placed, self.writer
         own = [i for i in branch.selects if i not in self.plan.goals]
-        lines = [f"{self._kind(i)} {self._name(i)};" for i in own]
+        lines = [f"{self.real.declared(write.logical[i])} {self._name(i)};" for i in own]
         condition = placed.source.nodes[branch.selects[0]].args[0]
         yes, no = (self.region(placed.inside[branch.region, branch.label, side]) for side in (1, 2))
         inner_yes, inner_no = ([INDENT + line for line in side] for side in (yes, no))
@@ -213,9 +215,6 @@ class _Body:
         if no[0].startswith("if (") and no[-1] == "}" and inside:
             return [*lines, f"}} else {no[0]}", *no[1:]]
         return [*lines, "} else {", *inner_no, "}"]
-
-    def _kind(self, i: int) -> str:
-        return "bool" if self.writer.logical[i] else self.real.name
 
     def _name(self, i: int) -> str:
         """Return a new name for the local of a node, and record it."""

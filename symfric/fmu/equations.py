@@ -15,7 +15,6 @@ import numpy as np
 from symfric.emitter.c99 import DOUBLE
 from symfric.fmu.variables import LEAST_RTOL, fixed_parameters
 from symfric.foundation.numeric import Array
-from symfric.integrator.arguments import chosen
 from symfric.integrator.equations.expressions import pieces
 from symfric.integrator.equations.initial import (
     FLOOR,
@@ -25,13 +24,13 @@ from symfric.integrator.equations.initial import (
     smallest_step,
 )
 from symfric.integrator.equations.inputs import InputData
+from symfric.integrator.methods.attempt import GROWTH_MEMORY, build_fixed
 from symfric.integrator.methods.method import suited_to_start
-from symfric.integrator.methods.tableaux import METHODS
+from symfric.integrator.methods.pieces import all_macros, routine
+from symfric.integrator.methods.tableaux import METHODS, chosen
 from symfric.integrator.running.engine import search_source
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.run import PACES
-from symfric.integrator.step.attempt import GROWTH_MEMORY, build_fixed
-from symfric.integrator.step.pieces import all_macros, routine
 from symfric.model import Model
 from symfric.model.start import start_function
 

@@ -34,16 +34,17 @@ from numpy.typing import ArrayLike
 from symfric.foundation import checks
 from symfric.foundation.numeric import Array
 from symfric.foundation.status import SolveError, Status
-from symfric.integrator import arguments
 from symfric.integrator.equations.initial import consistent, first_guess, first_step
 from symfric.integrator.equations.inputs import Input, InputData, input_data
 from symfric.integrator.equations.system import System
+from symfric.integrator.methods.tableaux import chosen
+from symfric.integrator.prepared import check_flags, check_span, result_times, tolerances
 from symfric.integrator.running.doubts import doubts
 from symfric.integrator.running.integrator import built
 from symfric.integrator.running.record import Dense, Outputs, Run, hermite
 from symfric.integrator.running.run import Tolerances
 from symfric.integrator.stored import trajectory_of
-from symfric.model import Model
+from symfric.model import Model, check_model
 from symfric.results.stored import Statistics
 from symfric.results.trajectory import Trajectory
 
@@ -296,21 +297,21 @@ def simulate_by_peer(
         SolveError: the integration failed; its `partial` is the trajectory so far.
     """
     where = "simulate_by_peer"
-    arguments.check_model(where, model)
-    arguments.check_flags(where, throw=throw)
-    t_start, t_end, rtol = arguments.check_span(where, model, t_start, t_end, rtol)
+    check_model(where, model)
+    check_flags(where, throw=throw)
+    t_start, t_end, rtol = check_span(where, model, t_start, t_end, rtol)
     checks.choice(f"{where}: peer", peer, PEERS)
     if model.events:
         raise ValueError(
             f"{where}: expected a model without events, got {len(model.events)} in "
             f"'{model.name}'; use simulate"
         )
-    times = arguments.result_times(where, t_start, t_end, t_eval, samples)
+    times = result_times(where, t_start, t_end, t_eval, samples)
     begin = perf_counter()
     inputs = input_data(model, u, t_start, t_end)
-    integrator, fresh = built(model, inputs, arguments.chosen(where, "auto", rtol))
+    integrator, fresh = built(model, inputs, chosen(where, "auto", rtol))
     built_at, system = perf_counter(), integrator.system
-    allowed = arguments.tolerances(where, rtol, atol, system.nominal, 1e-10, max_steps)
+    allowed = tolerances(where, rtol, atol, system.nominal, 1e-10, max_steps)
     y0 = first_guess(system, model, model.initial_state(x0, p, t_start), t_start)
     values = model.values("p", p)
     run, counts = integrate_by_peer(system, inputs, y0, values, times, allowed, peer)

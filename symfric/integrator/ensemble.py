@@ -28,18 +28,19 @@ from symfric.foundation import checks
 from symfric.foundation.numeric import Array
 from symfric.foundation.programs import CompileError, find_compiler
 from symfric.foundation.status import OverloadWarning, SolveError, Status
-from symfric.integrator import arguments
+from symfric.integrator.compiled.columns import BACKENDS
 from symfric.integrator.equations.initial import first_step
 from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.many.chunk import Chunk, Job, Points, SingleJob, Solved, digest, suited
-from symfric.integrator.many.member_data import MemberData, MemberInput, ends_of, member_data
+from symfric.integrator.many.member_data import MemberData, MemberInput, Store, ends_of, member_data
 from symfric.integrator.many.members import program
-from symfric.integrator.many.store import Store
+from symfric.integrator.methods.attempt import State
+from symfric.integrator.methods.tableaux import chosen
+from symfric.integrator.prepared import check_flags, check_span, check_times, stopping, tolerances
 from symfric.integrator.running.doubts import of_members
 from symfric.integrator.running.integrator import Integrator, built, in_results
 from symfric.integrator.running.run import Tolerances
-from symfric.integrator.step.attempt import State
-from symfric.model import Model
+from symfric.model import Model, check_model
 from symfric.results.ensemble import Ensemble
 
 if TYPE_CHECKING:
@@ -132,30 +133,30 @@ def simulate_many(
         OverloadWarning: friction above its static level in some members (`Ensemble.doubtful`).
     """
     where = "simulate_many"
-    arguments.check_model(where, model)
-    arguments.check_flags(where, progress)
+    check_model(where, model)
+    check_flags(where, progress)
     ends = ends_of(t_end)
-    t_start, last, rtol = arguments.check_span(where, model, t_start, float(np.max(ends)), rtol)
+    t_start, last, rtol = check_span(where, model, t_start, float(np.max(ends)), rtol)
     if np.min(ends) <= t_start:
         raise ValueError(
             f"{where}: expected t_end > t_start = {t_start:g} s, got {np.min(ends):g} s for "
             f"member {np.argmin(ends)}"
         )
-    formula = arguments.chosen(where, method, rtol)
+    formula = chosen(where, method, rtol)
     _check(backend, executor, real)
     workers = None if workers is None else checks.count(f"{where}: workers", workers)
     chunk = None if chunk is None else checks.count(f"{where}: chunk", chunk)
     if backend == CUDA:
         _devices().check(model, executor, workers, rtol, real)
     given = member_data(model, (t_start, ends), x0, u, p)
-    inputs = arguments.stopping(where, given.inputs, times, t_start, last)
+    inputs = stopping(where, given.inputs, times, t_start, last)
     given, members = replace(given, inputs=inputs), given.count
     looks = np.zeros(0) if np.ndim(ends) else np.array([last])
     if t_eval is not None:
-        looks = arguments.check_times(where, t_start, last, t_eval)
+        looks = check_times(where, t_start, last, t_eval)
     integrator, _ = built(model, inputs, formula)
     limits = integrator.system.nominal, event_tolerance, max_steps, max_step
-    allowed = arguments.tolerances(where, rtol, None, *limits)
+    allowed = tolerances(where, rtol, None, *limits)
     points = _points(integrator, given)
     integrator = suited(integrator, points, inputs)
     device: OnDevice | None = None
@@ -245,7 +246,7 @@ def _worker_ended(found: Ensemble, done: int, kept: bool) -> SolveError:
 
 
 def _check(backend: str, executor: object, real: str) -> None:
-    checks.choice("simulate_many: backend", backend, (*arguments.BACKENDS, CUDA))
+    checks.choice("simulate_many: backend", backend, (*BACKENDS, CUDA))
     checks.choice("simulate_many: real", real, REALS)
     if real != "double" and backend != CUDA:
         raise ValueError(

@@ -14,25 +14,12 @@ from symfric.foundation.programs import CompileError, find_compiler
 from symfric.foundation.status import SolveError, Status
 from symfric.integrator.equations.initial import consistent, first_guess
 from symfric.integrator.many.members import fastest
+from symfric.integrator.methods.attempt import Given, State
 from symfric.integrator.running.crossings import Memory
 from symfric.integrator.running.diagnosis import explain
 from symfric.integrator.running.integrator import Integrator
-from symfric.integrator.running.plants import (
-    AGAIN,
-    ATTEMPTS,
-    END,
-    OVER,
-    REFUSED,
-    SAMPLES,
-    SEARCH,
-    STORM,
-    Advance,
-    InPython,
-    Plants,
-    looking,
-)
+from symfric.integrator.running.plants import SAMPLES, Advance, InPython, Plants, Why, looking
 from symfric.integrator.running.run import MOST_ORDERS
-from symfric.integrator.step.attempt import Given, State
 
 Numbers = Mapping[str, ArrayLike]
 
@@ -167,7 +154,7 @@ class Plant:
             plants.S[b] = State.at(plants.begin[b], h, y)
             plants.R[b, Given.d(system.nx)] = np.concatenate([own, held])
             plants.R[b, Given.T_END] = plants.begin[b]
-            plants.u[b], plants.count[b], plants.why[b] = held, 0, END
+            plants.u[b], plants.count[b], plants.why[b] = held, 0, Why.END
             plants.memory[b] = remembered
             self._fresh[b] = guess
             self.failed.pop(b, None)
@@ -225,7 +212,7 @@ class Plant:
 
         With a batch, the value is an array, shape (batch,).
         """
-        over = self._plants.why == OVER
+        over = self._plants.why == Why.OVER
         return bool(over[0]) if self._batch is None else over
 
     @property
@@ -294,7 +281,7 @@ class Plant:
     def _mend(self, short: int) -> None:
         """Continue the plants that did not reach their sample; raise an error for lost ones."""
         plants = self._plants
-        if short == REFUSED:
+        if short == Plants.REFUSED:
             given = self._u.tolist()
             self._hold_on()
             where = f"plant of '{self.model.name}': u"
@@ -315,11 +302,11 @@ class Plant:
         plants, system = self._plants, self._integrator.system
         t, y, d = plants.S[b, State.T], plants.S[b, State.Y], plants.R[b, Given.d(system.nx)]
         where = f"stepper '{self.model.name}' at t = {t:.9g} s"
-        if plants.why[b] == ATTEMPTS:
+        if plants.why[b] == Why.ATTEMPTS:
             return Status.MAX_STEPS, f"{where}: {Status.MAX_STEPS.value}"
-        if plants.why[b] == STORM:
+        if plants.why[b] == Why.STORM:
             return Status.EVENT_STORM, f"{where}: {Status.EVENT_STORM.value}"
-        if plants.why[b] == SEARCH:
+        if plants.why[b] == Why.SEARCH:
             try:
                 y[:] = consistent(system, where, y.copy(), d)
             except ValueError as error:
@@ -328,7 +315,7 @@ class Plant:
             status, message = explain(self._integrator, t, y, d, float(plants.S[b, State.H]))
             plants.S[b] = State.at(t, plants.first_step(), y.copy())  # so that a retry can work
             return status, message.replace("simulate", "stepper", 1)
-        plants.why[b] = AGAIN
+        plants.why[b] = Why.AGAIN
         return None
 
     def _found_pivots(self, y: Array, d: Array) -> bool:

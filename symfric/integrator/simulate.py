@@ -10,15 +10,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from symfric.foundation import checks
-from symfric.integrator import arguments
 from symfric.integrator.derivatives.path import Path, seeds
 from symfric.integrator.derivatives.sensitivity import Differentiated
 from symfric.integrator.equations.inputs import Input
-from symfric.integrator.methods.tableaux import FOR_DERIVATIVES
-from symfric.integrator.prepared import checked, prepared
+from symfric.integrator.methods.tableaux import FOR_DERIVATIVES, another
+from symfric.integrator.prepared import check_flags, checked, prepared
 from symfric.integrator.running.run import own_scale
 from symfric.integrator.stored import Basis, Stored
-from symfric.model import Model
+from symfric.model import Model, check_model
 from symfric.results.trajectory import Trajectory
 
 NOTHING = 1e-9
@@ -181,8 +180,8 @@ def simulate(
             relax. The run is still returned; its `doubts` give the contact and the time.
         EnergyWarning: friction adds energy to the motion, for example a law with the wrong sign.
     """
-    arguments.check_model("simulate", model)
-    arguments.check_flags("simulate", progress, measure_error=measure_error, throw=throw)
+    check_model("simulate", model)
+    check_flags("simulate", progress, measure_error=measure_error, throw=throw)
     limits = event_tolerance, max_steps, max_step
     asked = t_start, t_end, rtol, atol, samples, method, backend, *limits
     ready, looks = prepared("simulate", model, asked, t_eval)
@@ -211,7 +210,7 @@ def simulate(
         finer = simulate(
             model, t_end, t_start=t_start, x0=x0, u=u, p=p, rtol=max(allowed.rtol / 100, 1e-13),
             atol=None if atol is None else atol / 100, event_tolerance=event_tolerance,
-            t_eval=trajectory.t, method=arguments.another(ready.method), backend=backend,
+            t_eval=trajectory.t, method=another(ready.method), backend=backend,
             max_step=run.extent.longest / 2, times=times, sensitivities=sensitivities,
         )  # fmt: skip
         off = difference(model, trajectory, finer)

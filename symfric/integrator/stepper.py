@@ -6,18 +6,19 @@ import casadi as ca
 import numpy as np
 
 from symfric.foundation import checks
-from symfric.integrator import arguments
+from symfric.integrator.compiled.columns import BACKENDS
 from symfric.integrator.equations.initial import first_guess, smallest_step
 from symfric.integrator.equations.inputs import InputData, input_data
 from symfric.integrator.equations.manifold import Manifold
 from symfric.integrator.equations.system import System, system
+from symfric.integrator.methods.attempt import State, build_fixed
 from symfric.integrator.methods.method import suited_to_start
-from symfric.integrator.methods.tableaux import METHODS
+from symfric.integrator.methods.tableaux import METHODS, chosen
 from symfric.integrator.plant import Numbers, Plant
+from symfric.integrator.prepared import check_span, tolerances
 from symfric.integrator.running.crossings import Memory
 from symfric.integrator.running.integrator import built
 from symfric.integrator.running.plants import SAMPLES, Plants
-from symfric.integrator.step.attempt import State, build_fixed
 from symfric.model import Model, check_model
 
 
@@ -75,14 +76,14 @@ def stepper(
     check_model(where, model)
     dt = checks.number(f"{where}: dt", dt, unit="s", above=0.0)
     t_start = checks.number(f"{where}: t_start", t_start, unit="s")
-    _, t_end, rtol = arguments.check_span(where, model, t_start, t_start + dt, rtol)
-    formula = arguments.chosen(where, method, rtol)
-    checks.choice(f"{where}: backend", backend, arguments.BACKENDS)
+    _, t_end, rtol = check_span(where, model, t_start, t_start + dt, rtol)
+    formula = chosen(where, method, rtol)
+    checks.choice(f"{where}: backend", backend, BACKENDS)
     members = 1 if batch is None else checks.count(f"{where}: batch", batch)
     # constant inputs have one entry each in the run data
     inputs = input_data(model, {v.name: float(v.start) for v in model.u}, t_start, t_end)
     integrator, _ = built(model, inputs, formula)
-    allowed = arguments.tolerances(
+    allowed = tolerances(
         where, rtol, atol, integrator.system.nominal, event_tolerance, max_steps, max_step
     )
     u = np.tile(model.values("u"), (members, 1))

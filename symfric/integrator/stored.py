@@ -12,8 +12,7 @@ import numpy as np
 from symfric.foundation.numeric import Array
 from symfric.foundation.status import Status
 from symfric.foundation.storable import agree
-from symfric.integrator.arguments import BACKENDS
-from symfric.integrator.compiled.columns import Columns
+from symfric.integrator.compiled.columns import BACKENDS, Columns
 from symfric.integrator.derivatives.path import Path, Seeds
 from symfric.integrator.derivatives.sensitivity import Differentiated
 from symfric.integrator.equations.inputs import InputData
@@ -238,6 +237,27 @@ def load_run(
             that contains unknown classes.
     """
     return RUN.load(path, own).unpacked()
+
+
+def statistics_of(
+    integrator: Integrator, run: Run, build_time: float, compile_time: float, run_time: float
+) -> Statistics:
+    """Return the statistics of a run; the arguments are times [s]."""
+    evaluations, jacobians, factorisations = integrator.tableau.work(integrator.system)
+    return Statistics(
+        backend=run.engine,
+        method=integrator.tableau.name,
+        steps=run.steps,
+        rejections=run.attempts - run.steps,
+        evaluations=run.attempts * evaluations,
+        jacobians=run.attempts * jacobians,
+        factorisations=run.attempts * factorisations,
+        events=len(run.happened),
+        smallest_step=run.extent.shortest,
+        build_time=build_time,
+        compile_time=compile_time,
+        run_time=run_time,
+    )
 
 
 def trajectory_of(

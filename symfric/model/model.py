@@ -18,8 +18,7 @@ from symfric.foundation.parameters import Variable, check_names
 from symfric.foundation.shown import Showing, Shown, Table, among, counted, figure_of
 from symfric.foundation.variable import stacked
 from symfric.model.forces import closed, opened, reopened, with_forces
-from symfric.model.holonomic import Holonomic
-from symfric.model.parts import Monitor, Output
+from symfric.model.parts import Holonomic, Monitor, Output
 from symfric.model.problems import (
     GROUPS,
     contact_problems,

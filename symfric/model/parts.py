@@ -1,11 +1,16 @@
-"""Parts of a model in addition to its equations: outputs, monitors for error control, events."""
+"""Parts of a model: outputs, monitors for error control, events, mechanical structure, drawing."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from math import inf
+from typing import Any, final
+
+import casadi as ca
 
 from symfric.foundation import checks, units
 from symfric.foundation.numeric import Scalar, is_casadi
+from symfric.foundation.packed import state_of
 from symfric.foundation.shown import figure_of
 from symfric.foundation.symbolic import take_symbols
 
@@ -114,3 +119,237 @@ class Event:
         way = {1: ", rising", -1: ", falling"}.get(self.direction, "")
         after = f", sets {', '.join(self.reset)}" if self.reset else ""
         return f"<event '{self.name}'{way}{after}{', ends the run' * self.terminal}>"
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Inner:
+    """Equations with inner unknowns l, so that each equation depends on few unknowns.
+
+        0 = f(y, l),   l_k = g_k(y, l_1 ... l_{k-1})
+
+    Attributes:
+        l: SX symbols (k, 1) of the inner unknowns.
+        values: SX (k, 1), the expressions g.
+        f: SX, the residual f in terms of l.
+        groups: symbols of all unknowns, including l, in the best order of elimination.
+    """
+
+    l: ca.SX  # noqa: E741
+    values: ca.SX
+    f: ca.SX
+    groups: tuple[ca.SX, ...]
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Solving:
+    """Solution M^-1 r, SX (n, 1), as an expression in the symbols r, SX (n, 1)."""
+
+    r: ca.SX
+    result: ca.SX
+
+    def __call__(self, r: ca.SX) -> ca.SX:
+        """Return M^-1 r."""
+        return ca.substitute(self.result, self.r, ca.densify(r))
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Holonomic:
+    """Structure of a mechanical model beyond its equations: constraints on its coordinates.
+
+    The states of the model begin with the coordinates q and their rates q', and the algebraic
+    variables with the multipliers lam of the constraints phi(q, t) = 0. The accelerations a are
+    symbols, so that the mass matrix need not be inverted:
+
+        M a + phi_q' lam = Q,   d^2 phi / dt^2 = phi_q a + ... = 0,   further algebraic equations
+
+    `ode` and `alg` of the model are derived from these equations by elimination of a.
+
+    Attributes:
+        n: number of coordinates.
+        phi: SX (m, 1), the constraints; without rows for a tree.
+        a: SX symbols (n, 1) of the accelerations.
+        implicit: SX (n + nz, 1), the equations above in q, q', the other states, a, z, u, p, t;
+            the first n are affine in a.
+        rates: SX (nx - 2 n, 1), rates of the other states.
+        solve: function that applies M^-1 to a column, if this costs less than factorising M.
+        norms: number of multipliers, the last ones, that belong to norms of Euler parameters; they
+            carry no load, and error control ignores them.
+        index: 0 for integration in the tangent space of the constraints, with as many unknowns as
+            degrees of freedom; 1 for integration of all coordinates, which are projected onto the
+            constraints at the end of each step. Both solutions agree within the tolerance.
+        inner: the same equations with inner unknowns for long chains, which make the derivatives
+            sparse; None for all other mechanisms.
+        pressing: SX (k, 1), normal forces divided by their typical magnitude, which must not be
+            negative.
+        pressed: names of these normal forces.
+        advice: hint that is shown if friction and reactions have no solution; may be empty.
+        applied: number of algebraic variables that are forces in stick. They follow the
+            multipliers, and their equations follow the constraints.
+    """
+
+    n: int
+    phi: ca.SX
+    a: ca.SX
+    implicit: ca.SX
+    rates: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
+    solve: Callable[[ca.SX], ca.SX] | None = None
+    norms: int = 0
+    index: int = 1
+    inner: Inner | None = None
+    pressing: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
+    pressed: tuple[str, ...] = ()
+    advice: str = ""
+    applied: int = 0
+
+    def to_pack(self) -> dict[str, Any]:
+        """Return the fields and derived expressions, with `solve` converted to an expression."""
+        state = state_of(self)
+        if self.solve is not None:
+            right = ca.SX.sym("right", self.n)
+            state["solve"] = Solving(right, self.solve(right))
+        return state | {"explicit": self.explicit}
+
+    @cached_property
+    def explicit(self) -> tuple[ca.SX, ca.SX]:
+        """Accelerations (n, 1) and algebraic equations (nz, 1) without the symbols a."""
+        balance, others = self.implicit[: self.n, 0], self.implicit[self.n :, 0]
+        right = -ca.substitute(balance, self.a, ca.SX.zeros(self.n))
+        if self.solve is None:
+            D, L, order = ca.ldl(ca.jacobian(balance, self.a))
+            acceleration = ca.ldl_solve(ca.densify(right), D, L, order)
+        else:
+            acceleration = self.solve(right)
+        return acceleration, ca.substitute(others, self.a, acceleration)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Part:
+    """Body, drawn as lines from its centre to its places.
+
+    Attributes:
+        name: name of the body.
+        centre: index of the place at the centre of mass.
+        corners: indices of the frames; a body whose frames all coincide with its centre is drawn as
+            a block.
+        ends: indices of places that have only springs and dampers.
+        fixed: True for the ground, which has no lines.
+        label: symbol or value of the mass or inertia.
+    """
+
+    name: str
+    centre: int
+    corners: tuple[int, ...]
+    ends: tuple[int, ...] = ()
+    fixed: bool = False
+    label: str = ""
+
+
+@final
+@dataclass(frozen=True)
+class Symbol:
+    """Drawing style of a joint, a rod or a spring between two places a and b.
+
+    Attributes:
+        marker: shape of the marker at b; empty for no marker.
+        line: line from a to b: "rod", "spring", "damper", or "strut" for a spring and a damper;
+            "circle" about a through b, "spiral" for a torsion spring at b, "link" for a gear or a
+            belt; empty for no line.
+        axes: lines through b along axes of a or b, each given as ("a" or "b", number of the axis).
+        hinge: True for a pure rotation about z of b.
+        guide: True for sliding along z of a.
+        slot: True for sliding along z of a in a slot attached to the origin of a.
+        plate: True for motion in the plane x, y of a.
+        anchored: True if the attachment to the ground is drawn.
+    """
+
+    marker: str = ""
+    line: str = ""
+    axes: tuple[tuple[str, int], ...] = ()
+    hinge: bool = False
+    guide: bool = False
+    slot: bool = False
+    plate: bool = False
+    anchored: bool = False
+
+    @property
+    def turnable(self) -> bool:
+        """True if a and b may be exchanged: at most one has axes, and there is no slot."""
+        return len({end for end, _ in self.axes}) < 2 and not self.slot
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Mark:
+    """Element between two places, such as a joint, a rod or a spring.
+
+    Attributes:
+        name: name of the element.
+        symbol: drawing style.
+        a, b: indices of the two places; if one of them is on the ground, it is a.
+        slips: name of the sliding velocity of each contact, and the velocity [m/s] below which the
+            contact counts as sticking.
+        grounded: True if a is on the ground.
+        contacts: names of the contacts with friction of this element.
+        label: symbols or values of stiffness and damping.
+    """
+
+    name: str
+    symbol: Symbol
+    a: int
+    b: int
+    slips: tuple[tuple[str, float], ...] = ()
+    grounded: bool = False
+    contacts: tuple[str, ...] = ()
+    label: str = ""
+
+
+@final
+@dataclass(frozen=True)
+class Arrow:
+    """Positive direction of coordinates, velocities, forces or inputs.
+
+    Attributes:
+        names: names of the quantities, such as a coordinate and its rate.
+        at: index of the place at the arrow.
+        frame: index of the place whose axes `axis` refers to.
+        axis: direction, or axis of rotation.
+        turning: True for a rotation.
+    """
+
+    names: tuple[str, ...]
+    at: int
+    frame: int
+    axis: tuple[float, float, float]
+    turning: bool = False
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Sketch:
+    """Drawing of a machine.
+
+    Attributes:
+        places: SX (12, k) in the symbols of a model: the axes of each place in the world, column by
+            column, followed by its position [m].
+        parts: bodies.
+        marks: elements between the places.
+        symbols: size of the symbols of joints relative to their size in a mechanism.
+        arrows: positive directions, drawn in a schematic.
+        layout: arrangement in a schematic, if it differs from that in motion.
+    """
+
+    places: ca.SX
+    parts: tuple[Part, ...]
+    marks: tuple[Mark, ...]
+    symbols: float = 1.0
+    arrows: tuple[Arrow, ...] = ()
+    layout: "Sketch | None" = None
+
+    @property
+    def still(self) -> bool:
+        """True if nothing in the drawing moves."""
+        return self.places.is_constant()

@@ -16,9 +16,7 @@ from symfric.foundation.parameters import Variable
 from symfric.foundation.units import per_second
 from symfric.foundation.variable import stacked, starts_of, symbols_of
 from symfric.model.contact import Contact, Variables
-from symfric.model.holonomic import Holonomic
-from symfric.model.parts import Event, Monitor, Output
-from symfric.model.sketch import Sketch
+from symfric.model.parts import Event, Holonomic, Monitor, Output, Sketch
 
 
 @dataclass(frozen=True, eq=False, repr=False)

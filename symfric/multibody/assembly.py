@@ -24,7 +24,7 @@ from symfric.foundation.variable import at_start, stacked, symbols_of
 from symfric.laws.catalogue import law_name
 from symfric.laws.composed.isotropic import SpatialSlip
 from symfric.model import Contact, Model, Monitor, Output, Variables, kinds
-from symfric.model.holonomic import Holonomic, Inner
+from symfric.model.parts import Holonomic, Inner
 from symfric.multibody.applied import Rest, rests, solve_mass
 from symfric.multibody.contact import depends_on_load
 from symfric.multibody.equations import Equations, normals_with
@@ -161,15 +161,18 @@ def _inner(cut: Equations, eq: Equations, contacts: Sequence[Slip]) -> Inner | N
         [ca.vertcat(cut.a, cut.F, cut.N)],
         [ca.vertcat(eq.a, stacked(s.force for s in contacts), eq.N)],
     )
-    kept = cuts.needed(f)
+    kept, symbols = cuts.needed(f), cuts.symbols
+    of_link: list[list[ca.SX]] = [[] for _ in links]
+    for i in kept:
+        of_link[cuts.links[i]].append(symbols[i])
     groups: list[ca.SX] = []
     for k, link in reversed(list(enumerate(links))):
         # inner unknowns first: their right-hand sides are zero, so they cost no stage
-        groups.append(stacked(cuts.symbols[i] for i in kept if cuts.links[i] == k))
+        groups.append(stacked(of_link[k]))
         groups.append(ca.vertcat(*(column[link.rows] for column in (eq.q, eq.qd, eq.a))))
         own = (s for s in contacts if s.contact.link == link.joint.name)
         groups.append(symbols_of(v for s in own for v in (*s.unknown, *s.states)))
-    return Inner(cuts.symbols[kept], values[kept], f, tuple(groups))
+    return Inner(symbols[kept], values[kept], f, tuple(groups))
 
 
 def _pressing(contacts: Sequence[Slip], reactive: ca.SX) -> tuple[ca.SX, tuple[str, ...], str]:

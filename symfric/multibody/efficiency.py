@@ -4,7 +4,7 @@ import casadi as ca
 
 from symfric.foundation.checks import listed, refused
 from symfric.laws.base import smooth
-from symfric.results.quadrature import integrals
+from symfric.results.signals import integrals
 from symfric.results.trajectory import Trajectory
 
 ENDS = ("power_a", "power_b")

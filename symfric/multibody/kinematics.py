@@ -7,6 +7,7 @@ from typing import NamedTuple, final
 import casadi as ca
 import numpy as np
 
+from symfric.foundation.numeric import nonzeros
 from symfric.foundation.parameters import Variable
 from symfric.foundation.variable import stacked
 from symfric.model.kinds import POSITION
@@ -27,24 +28,31 @@ class Cuts:
     articulated-body algorithm, but for all unknowns of an implicit step.
 
     Attributes:
-        symbols: l, shape (k, 1).
-        values: value of each entry of l, in terms of coordinates and preceding entries of l.
         links: number of the link to which each entry of l belongs.
     """
 
     def __init__(self) -> None:
-        self.symbols, self.values = ca.SX(0, 1), ca.SX(0, 1)
+        self._symbols, self._values = list[ca.SX](), list[ca.SX]()
         self.links: list[int] = []
+
+    @property
+    def symbols(self) -> ca.SX:
+        """The symbols l, shape (k, 1)."""
+        return stacked(self._symbols)
+
+    @property
+    def values(self) -> ca.SX:
+        """Value of each entry of l, in terms of coordinates and preceding entries of l."""
+        return stacked(self._values)
 
     def __call__(self, link: int, expression: ca.SX) -> ca.SX:
         """Return `expression` with entries other than numbers and symbols replaced by symbols."""
         cut = ca.SX(expression)
-        for k in range(cut.nnz()):
-            value = ca.SX(cut.nz[k])
+        for k, value in enumerate(nonzeros(cut)):
             if not (value.is_constant() or value.is_symbolic()):
                 symbol = ca.SX.sym(f"l_{len(self.links)}")
-                self.symbols = ca.vertcat(self.symbols, symbol)
-                self.values = ca.vertcat(self.values, value)
+                self._symbols.append(symbol)
+                self._values.append(value)
                 self.links.append(link)
                 cut.nz[k] = symbol
         return cut
@@ -53,11 +61,11 @@ class Cuts:
         """Return the indices of the entries of l on which `expression` depends, also indirectly."""
         found = np.zeros(len(self.links), dtype=bool)
         found[ca.jacobian_sparsity(expression, self.symbols).get_triplet()[1]] = True
-        own = ca.jacobian_sparsity(self.values, self.symbols)
-        rows, columns = (np.array(part, dtype=int) for part in own.get_triplet())
+        own = ca.jacobian_sparsity(self.values, self.symbols).T
+        first, columns = (np.array(part, dtype=int) for part in (own.colind(), own.row()))
         for k in range(found.size - 1, -1, -1):
             if found[k]:
-                found[columns[rows == k]] = True
+                found[columns[first[k] : first[k + 1]]] = True
         return [int(k) for k in np.flatnonzero(found)]
 
 
@@ -122,9 +130,13 @@ class Motion(NamedTuple):
         """Velocity of the origin in world components."""
         return self.R @ self.v_B
 
+    def place(self, offset: ca.SX) -> ca.SX:
+        """Return the position in the world of a point fixed to the body."""
+        return self.p + self.R @ offset
+
     def point(self, offset: ca.SX) -> tuple[ca.SX, ca.SX]:
         """Return the position and velocity in the world of a point fixed to the body."""
-        return self.p + self.R @ offset, self.R @ (self.v_B + ca.cross(self.w_B, offset))
+        return self.place(offset), self.R @ (self.v_B + ca.cross(self.w_B, offset))
 
 
 class Relative(NamedTuple):

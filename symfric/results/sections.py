@@ -15,8 +15,7 @@ from symfric.foundation.parameters import check_names
 from symfric.foundation.shown import Showing, Shown, Table
 from symfric.model import Contact
 from symfric.model.kinds import MODE
-from symfric.results.quadrature import extremes, integral_between
-from symfric.results.signals import Signals
+from symfric.results.signals import Signals, extremes, integral_between
 
 PARTS = 32
 """Number of parts into which an interval with a crossing is divided at a time."""

@@ -18,9 +18,8 @@ from symfric.foundation.shown import Showing, Shown, Table, among, counted
 from symfric.foundation.variable import stacked
 from symfric.model.kinds import WORK
 from symfric.model.model import friction
-from symfric.results.quadrature import integrals
 from symfric.results.sections import Cycle, crossings, cycle
-from symfric.results.signals import Signals
+from symfric.results.signals import Signals, integrals
 from symfric.results.stored import module
 
 if TYPE_CHECKING:

@@ -27,7 +27,7 @@ from symfric.laws import Law
 from symfric.laws.base.law import require_law
 from symfric.model import Contact, Model, Output, Variables
 from symfric.model.contact import APPLIED
-from symfric.model.sketch import Arrow, Mark, Part, Sketch, Symbol
+from symfric.model.parts import Arrow, Mark, Part, Sketch, Symbol
 from symfric.scenes.presets import Preset, presets_of
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from symfric import Model, SolveError, Trajectory, law_from_text, parameters, with_values
 from symfric.foundation.numeric import Array
 from symfric.integrator import Hold, Input, Linear, simulate
-from symfric.integrator.arguments import another, chosen
+from symfric.integrator.methods.tableaux import another, chosen
 from symfric.scenes import ALL_SCENES
 from symfric.stress.cases import Case
 from symfric.stress.referee import NO_FORCE, SINE, Question, Signal, knows, solve

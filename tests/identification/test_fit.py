@@ -163,7 +163,8 @@ def test_a_fit_of_bristles_at_the_measured_velocity_recommends_simulation() -> N
 
 SCRIPT = """
 from identification import Filter, Fit, InverseDynamics, synthetic_drive_data
-kind, data = InverseDynamics(filter=Filter(100.0, 1)), synthetic_drive_data(speeds=(0.01, 0.05))
+kind = InverseDynamics(filter=Filter(100.0, 1), dead_time=None)
+data = synthetic_drive_data(speeds=(0.01, 0.05))
 fit = Fit(kind, "stribeck", data, starts=1).solve(throw=False)
 print(" ".join(e.value.hex() for e in fit.parameters.values()))
 print(" ".join((e.standard_error or 0.0).hex() for e in fit.parameters.values()))

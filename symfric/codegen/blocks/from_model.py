@@ -23,11 +23,10 @@ from symfric.foundation.parameters import Parameter, Parametric, Variable, param
 from symfric.integrator.equations.initial import consistent
 from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.equations.system import System, system
+from symfric.integrator.methods.attempt import build_fixed
 from symfric.integrator.methods.families import BackwardEuler, Exponential, Rosenbrock
 from symfric.integrator.methods.method import Method, suited_to_start
-from symfric.integrator.methods.radau import Radau
-from symfric.integrator.methods.tableaux import METHODS
-from symfric.integrator.step.attempt import build_fixed
+from symfric.integrator.methods.tableaux import METHODS, Radau
 from symfric.model import Model, Output, Variables, check_model
 
 

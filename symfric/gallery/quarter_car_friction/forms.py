@@ -13,7 +13,7 @@ from symfric.gallery.plate import Drawn, plate
 from symfric.gallery.quarter_car_friction import rig
 from symfric.gallery.quarter_car_friction.rig import as_printed, driven
 from symfric.gallery.shared import look
-from symfric.results.quadrature import integral_between
+from symfric.results.signals import integral_between
 
 END, VISCOUS = 10.0, 0.02
 """End of the curve [Stribeck velocities], and its viscous slope [F_C per Stribeck velocity]."""

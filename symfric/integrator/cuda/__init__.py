@@ -3,7 +3,7 @@
 Everything except the launches is shared with the other backends: members start on the CPU, fail
 with the same messages, stop and continue where algebraic unknowns need a full search, and are
 stored chunk by chunk in memory or in a folder. symfric's own emitter writes the attempt, the
-signals and the update of algebraic unknowns in C (`step.pieces`); `members.h` advances over the
+signals and the update of algebraic unknowns in C (`methods.pieces`); `members.h` advances over the
 input intervals. A thread that has finished a member takes the next one, so the threads of a warp
 stay together until no member is left. A launch ends after a number of attempts that takes a quarter
 of a second, and unfinished members continue in the next launch.

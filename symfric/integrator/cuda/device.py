@@ -4,6 +4,7 @@ The source is valid as C and as CUDA C++. For a graphics processor and for a hos
 lines before and after it differ, so the arithmetic is tested without a graphics processor.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -14,10 +15,9 @@ import numpy as np
 from symfric.emitter.c99 import DOUBLE, Real
 from symfric.integrator.compiled.columns import densified
 from symfric.integrator.equations.blocks import DONE, ROUNDS
-from symfric.integrator.equations.initial import FLOOR
+from symfric.integrator.many.members import defined, loop_sizes
+from symfric.integrator.methods.pieces import in_c, macros
 from symfric.integrator.running.integrator import Integrator
-from symfric.integrator.step.attempt import Given, State
-from symfric.integrator.step.pieces import in_c, macros
 
 NAME = "symfric_launch"
 DONE_IN_SINGLE = 1e-5
@@ -86,19 +86,15 @@ def kernel_of(integrator: Integrator, between: bool = True, real: Real = DOUBLE)
 
 def _written(integrator: Integrator, between: bool, real: Real) -> Kernel:
     step, signals, system = integrator.step, densified(integrator.signals), integrator.system
-    n, follow, head = system.n, integrator.follow if integrator.follows else None, "static DEVICE "
+    follow, head = integrator.follow if integrator.follows else None, "static DEVICE "
     names = ("next", "D" if between else "")
     functions = [
         in_c(step, "symfric_attempt", ("S", "R"), names, real, head),
         in_c(signals, "symfric_values", ("t", "y", "d"), ("out",), real, head),
     ]
-    sizes: dict[str, object] = {
-        "N": n, "NX": system.nx, "MEMORY": State.MEMORY, "T": State.T, "H": State.H,
-        "SIZE_R": step.numel_in(1), "T_END": Given.T_END, "N_D": signals.numel_in(2),
-        "ROWS": step.numel_out(1) // n if between else 0, "SIGNALS": signals.numel_out(0),
-        "FLOOR": repr(FLOOR), "OWN_TIME": int(real.size < 8), "TIMED": int(system.timed),
-        "FOLLOWS": 0 if not integrator.follows else 1 if follow is None else 2,
-    }  # fmt: skip
+    sizes = loop_sizes(step, signals, integrator.follows, follow)
+    sizes |= {"NX": system.nx, "OWN_TIME": int(real.size < 8), "TIMED": int(system.timed)}
+    sizes |= {} if between else {"ROWS": 0}
     if follow is not None:
         done = DONE if real.size == 8 else DONE_IN_SINGLE
         sizes |= {
@@ -108,12 +104,11 @@ def _written(integrator: Integrator, between: bool, real: Real) -> Kernel:
         places = ("y", "d"), ("after", "look")
         functions.append(in_c(follow.round, "symfric_round", *places, real, head))
     written = "\n".join(one.text for one in functions)
-    defined = "".join(f"#define {name} {value}\n" for name, value in sizes.items())
     loop = Path(__file__).with_name("members.h").read_text(encoding="utf-8")
     # define sizes after the written functions, whose arguments may have the same names
-    text = f"typedef {real.name} real;\n{macros(functions, real)}\n{written}\n{defined}\n{loop}"
+    text = f"typedef {real.name} real;\n{macros(functions, real)}\n{written}\n"
     numbers = step.numel_in(0), step.numel_in(1), system.nx, signals.numel_out(0)
-    return Kernel(text, real, *numbers, functions[0].operations)
+    return Kernel(f"{text}{defined(sizes)}\n{loop}", real, *numbers, functions[0].operations)
 
 
 BLOCK = 64
@@ -125,6 +120,12 @@ valid for the device up to the last digits of exp, sin, pow and similar function
 WARP, GRAIN = 32, 256
 """Number of threads of a warp, and the unit in which registers are allocated to a warp."""
 MEANWHILE = "use backend='auto' meanwhile"
+Launch = Callable[[bytes, int], None]
+"""Function that runs up to a number of threads on the data of a struct `Many` and waits for them.
+
+It raises a `DeviceError` if the device fails, for example by the time limit of a device that also
+drives a screen.
+"""
 
 
 class DeviceError(RuntimeError):
@@ -179,23 +180,36 @@ class Device:
         self.cupy.get_default_memory_pool().free_all_blocks()
         return int(self.cupy.cuda.runtime.memGetInfo()[0])
 
-    def load(self, kernel: Kernel) -> "Loaded":
+    def load(self, kernel: Kernel) -> Launch:
         """Compile a kernel, or load it from CuPy's cache.
 
         Raises:
             DeviceError: NVRTC is missing or rejects the kernel.
         """
-        code = f"{BEFORE}{kernel.text}{AFTER}"
-        module = self.cupy.RawModule(code=code, options=OPTIONS, backend="nvrtc")
+        code, cupy = f"{BEFORE}{kernel.text}{AFTER}", self.cupy
+        module = cupy.RawModule(code=code, options=OPTIONS, backend="nvrtc")
         try:
             function = module.get_function(NAME)
-        except (self.cupy.cuda.compiler.CompileException, RuntimeError, OSError) as error:
+        except (cupy.cuda.compiler.CompileException, RuntimeError, OSError) as error:
             reason = (str(error).strip() or type(error).__name__).splitlines()[0]
             raise DeviceError(
                 f"simulate_many: backend='cuda': NVRTC did not compile the kernel ({reason}); "
                 f"pip install 'symfric[cuda]' installs a matching version, or {MEANWHILE}"
             ) from None
-        return Loaded(self.cupy, function, self.threads(int(function.num_regs)))
+        most = self.threads(int(function.num_regs))
+
+        def launch(many: bytes, threads: int) -> None:
+            held = cupy.asarray(np.frombuffer(many, dtype=np.uint8))
+            try:
+                function((-(-min(threads, most) // BLOCK),), (BLOCK,), (held,))
+                cupy.cuda.get_current_stream().synchronize()
+            except RuntimeError as error:  # base class of CuPy's errors
+                raise DeviceError(
+                    f"simulate_many: the graphics processor stopped ({error}); complete chunks "
+                    "are in the folder `out`, if given"
+                ) from None
+
+        return launch
 
     def threads(self, registers: int) -> int:
         """Return the number of threads that run at once if each uses this number of registers."""
@@ -204,36 +218,3 @@ class Device:
         warps = int(p["regsPerMultiprocessor"]) // of_warp
         threads = min(warps * WARP, int(p["maxThreadsPerMultiProcessor"])) // BLOCK * BLOCK
         return int(p["multiProcessorCount"]) * max(BLOCK, threads)
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class Loaded:
-    """Kernel on the device.
-
-    Attributes:
-        cupy: module `cupy`.
-        function: the kernel, a `RawKernel` of CuPy.
-        threads: number of threads that run at once.
-    """
-
-    cupy: Any
-    function: Any
-    threads: int
-
-    def __call__(self, many: bytes, threads: int) -> None:
-        """Run up to `threads` threads on the data of the struct `many`, and wait for them.
-
-        Raises:
-            DeviceError: the device failed, for example by the time limit of a device that also
-                drives a screen.
-        """
-        held = self.cupy.asarray(np.frombuffer(many, dtype=np.uint8))
-        try:
-            self.function((-(-min(threads, self.threads) // BLOCK),), (BLOCK,), (held,))
-            self.cupy.cuda.get_current_stream().synchronize()
-        except RuntimeError as error:  # base class of CuPy's errors
-            raise DeviceError(
-                f"simulate_many: the graphics processor stopped ({error}); complete chunks "
-                "are in the folder `out`, if given"
-            ) from None

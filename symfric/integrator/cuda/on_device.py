@@ -10,13 +10,13 @@ from numpy.typing import DTypeLike, NDArray
 
 from symfric.emitter.c99 import REALS
 from symfric.foundation.numeric import Array
-from symfric.integrator.cuda.device import Device, Kernel, Loaded, kernel_of
+from symfric.integrator.cuda.device import Device, Kernel, Launch, kernel_of
 from symfric.integrator.many.chunk import Chunk, Job, Solved
 from symfric.integrator.many.member_data import MemberData
 from symfric.integrator.many.members import Advanced, Counts, Program, Stretch, struct, with_code
+from symfric.integrator.methods.attempt import State
 from symfric.integrator.running.events import Stop
 from symfric.integrator.running.integrator import Integrator
-from symfric.integrator.step.attempt import State
 from symfric.model import Model
 
 WHERE = "simulate_many: backend='cuda'"
@@ -75,7 +75,7 @@ class OnDevice:
     Attributes:
         job: data shared by all chunks.
         kernel: source and sizes of the kernel.
-        device, loaded: device that runs the members, and the kernel loaded on it.
+        device, launch: device that runs the members, and the kernel loaded on it.
         tell: function called between launches with the number of finished members of a chunk.
         budget: attempts of a thread in the next launch.
     """
@@ -83,7 +83,7 @@ class OnDevice:
     job: Job
     kernel: Kernel
     device: Device
-    loaded: Loaded
+    launch: Launch
     tell: Callable[[int], None] | None = None
     budget: int = FIRST
 
@@ -203,7 +203,7 @@ class OnDevice:
             addresses = {name: int(array.data.ptr) for name, array in (held | own).items()}
             many = Many(**addresses, **numbers, n_todo=todo.size, budget=self.budget)
             began = perf_counter()
-            self.loaded(bytes(many), todo.size)
+            self.launch(bytes(many), todo.size)
             self.launched(perf_counter() - began)
             reason = held["reason"].get()
             begun, waiting = np.flatnonzero(reason == Stop.FULL), np.flatnonzero(reason == FRESH)

@@ -19,8 +19,8 @@ from symfric.integrator.compiled.columns import NAME, Columns, filled
 from symfric.integrator.derivatives.path import Parameters, of_data
 from symfric.integrator.equations.expressions import branchless, divided_once
 from symfric.integrator.many.vectors import lanes_header, vector_source
+from symfric.integrator.methods.attempt import build_dense_step
 from symfric.integrator.running.integrator import Integrator
-from symfric.integrator.step.attempt import build_dense_step
 
 FEW, MANY = 4, 8
 """Numbers of lanes: for up to four names, and for more."""

@@ -26,7 +26,7 @@ import numpy as np
 from symfric.foundation.numeric import Array, evaluate
 from symfric.integrator.equations.matrices import factorise
 from symfric.model import Model
-from symfric.model.holonomic import Holonomic
+from symfric.model.parts import Holonomic
 
 DEPENDENT = 1e-4
 """Ratio of singular values of phi_q below which a stopped mechanism is called singular.

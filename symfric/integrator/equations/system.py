@@ -38,7 +38,7 @@ from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.equations.manifold import Manifold, holonomic_columns, manifold
 from symfric.integrator.equations.matrices import Order, echelon, null_space
 from symfric.model import Model
-from symfric.model.holonomic import Inner
+from symfric.model.parts import Inner
 
 Columns = tuple[ca.SX, ca.SX, ca.SX, list[str]]
 """Unknowns without time, right-hand side, mass matrix and names."""

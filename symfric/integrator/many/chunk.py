@@ -12,15 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation.numeric import Array
+from symfric.foundation.packed import state_of
 from symfric.foundation.status import Status
 from symfric.integrator.equations.initial import consistent_many, smallest_step
 from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.many.members import Program, Runner, Stretch, with_code
+from symfric.integrator.methods.attempt import Given, State
 from symfric.integrator.methods.method import Method
 from symfric.integrator.running.events import Stop
 from symfric.integrator.running.integrator import Integrator, built
 from symfric.integrator.running.run import ROUNDS, Tolerances, integrate, own_scale, watchful
-from symfric.integrator.step.attempt import Given, State
 from symfric.model import Model
 
 Indices = NDArray[np.intp]
@@ -254,7 +255,7 @@ class SingleJob:
     times: Array
 
     def __getstate__(self) -> dict[str, Any]:
-        return {item.name: getattr(self, item.name) for item in fields(self)}
+        return state_of(self)
 
     @cached_property
     def integrator(self) -> Integrator:

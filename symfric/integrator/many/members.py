@@ -4,8 +4,8 @@ A `Program` contains the equations of an ensemble for workers that do not have t
 """
 
 import ctypes
-from collections.abc import Callable
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import cached_property
 from threading import Lock
 from typing import Any, cast, final
@@ -15,24 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation.numeric import Array
+from symfric.foundation.packed import state_of
 from symfric.integrator.compiled.columns import Columns, densified
 from symfric.integrator.compiled.compiler import load
 from symfric.integrator.equations.blocks import Following
 from symfric.integrator.equations.initial import ASSEMBLED, FLOOR, ITERATIONS, Equations
 from symfric.integrator.equations.manifold import Manifold
 from symfric.integrator.many.vectors import c_text, lanes_header, vector_source
+from symfric.integrator.methods.attempt import Given, State
 from symfric.integrator.running.integrator import Integrator
-from symfric.integrator.running.plants import (
-    AGAIN,
-    MEMBERS,
-    REFUSED,
-    SEARCH,
-    Advance,
-    Plants,
-    compiled,
-    loaded,
-)
-from symfric.integrator.step.attempt import Given, State
+from symfric.integrator.running.plants import MEMBERS, Advance, Plants, Why, compiled, loaded
 
 Counts = NDArray[np.int64]
 _LOCK = Lock()
@@ -178,24 +170,37 @@ def many_source(
         lanes: number of lanes of a vector; by default as many as the processor supports. It does
             not affect the bits of the results.
     """
-    n = step.numel_in(0) - State.MEMORY
     step = step if step.is_a("SXFunction") else step.expand()
     groups = 2 if step.n_instructions() < PAIRED else 1
     of_step, work = vector_source("symfric_step", step, groups)
     of_values, more = vector_source("symfric_values", densified(signals))
-    sizes = {
-        "N": n, "MEMORY": State.MEMORY, "T": State.T, "H": State.H, "SIZE_R": step.numel_in(1),
-        "T_END": Given.T_END, "N_D": signals.numel_in(2), "ROWS": step.numel_out(1) // n,
-        "SIGNALS": signals.numel_out(0), "FLOOR": repr(FLOOR), "WORK": max(work, more),
-        "GROUPS": groups, "FOLLOWS": 0 if not follows else 1 if follow is None else 2,
-    }  # fmt: skip
+    sizes = loop_sizes(step, signals, follows, follow)
+    sizes |= {"WORK": max(work, more), "GROUPS": groups}
     jump = ""
     if follow is not None:
         generator = ca.CodeGenerator("symfric_round.c", {"static_aux": True})
         generator.add(follow.round)
         jump = generator.dump() + follow.c_source
-    defined = "".join(f"#define {name} {value}\n" for name, value in sizes.items())
-    return f"{jump}{lanes_header(lanes)}\n{of_step}{of_values}{defined}{c_text('loop.h')}"
+    written = f"{jump}{lanes_header(lanes)}\n{of_step}{of_values}"
+    return written + defined(sizes) + c_text("loop.h")
+
+
+def loop_sizes(
+    step: ca.Function, signals: ca.Function, follows: bool, follow: Following | None
+) -> dict[str, object]:
+    """Return the macros of a loop over members: sizes, and indices in S and R."""
+    n = step.numel_in(0) - State.MEMORY
+    return {
+        "N": n, "MEMORY": State.MEMORY, "T": State.T, "H": State.H, "SIZE_R": step.numel_in(1),
+        "T_END": Given.T_END, "N_D": signals.numel_in(2), "ROWS": step.numel_out(1) // n,
+        "SIGNALS": signals.numel_out(0), "FLOOR": repr(FLOOR),
+        "FOLLOWS": 0 if not follows else 1 if follow is None else 2,
+    }  # fmt: skip
+
+
+def defined(macros: Mapping[str, object]) -> str:
+    """Return the C that defines these macros."""
+    return "".join(f"#define {name} {value}\n" for name, value in macros.items())
 
 
 class Assembly:
@@ -266,7 +271,7 @@ class Program:
     follow: Following | None
 
     def __getstate__(self) -> dict[str, Any]:
-        return {item.name: getattr(self, item.name) for item in fields(self)}
+        return state_of(self)
 
     @property
     def nx(self) -> int:
@@ -344,8 +349,7 @@ def plants_source(integrator: Integrator) -> str:
     nothing = ca.Function("nothing", [ca.SX.sym("t"), s.y, s.d], [ca.SX(0, 1)])
     every = many_source(integrator.step, nothing, integrator.follows, integrator.follow)
     numbers = {
-        "HELD": integrator.inputs.data.numel(), "REFUSED": REFUSED, "SEARCHED": SEARCH,
-        "AGAIN": AGAIN,
+        "HELD": integrator.inputs.data.numel(), "REFUSED": f"({Plants.REFUSED})",
+        "SEARCHED": Why.SEARCH, "AGAIN": Why.AGAIN,
     }  # fmt: skip
-    defined = "".join(f"#define {name} ({value})\n" for name, value in numbers.items())
-    return every + MEMBERS + defined + c_text("plants.c")
+    return every + MEMBERS + defined(numbers) + c_text("plants.c")

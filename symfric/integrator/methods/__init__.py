@@ -1,1 +1,1 @@
-"""Integration methods: coefficients with their sources, and the steps of each family."""
+"""Integration methods: coefficients with their sources, steps of each family, adaptive attempts."""

@@ -56,7 +56,7 @@ class Method(ABC):
         dense_dae: order of the dense output for index-1 DAEs.
         H: coefficients of the dense output in terms of the stages, shape (r, s).
         finer: factor by which the change of a sliding velocity near zero in one step is limited
-            more than usual (`step.attempt`).
+            more than usual (`methods.attempt`).
         source: publication of the coefficients.
     """
 

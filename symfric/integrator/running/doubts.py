@@ -26,7 +26,7 @@ only if it is constant.
 
 from collections.abc import Callable, Collection, Hashable, Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property, partial
 from math import inf
 from typing import Any, final
 
@@ -34,17 +34,17 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.foundation.memory import remember
 from symfric.foundation.numeric import Array
 from symfric.foundation.status import EnergyWarning, OverloadWarning
 from symfric.foundation.variable import strays, symbols_of
 from symfric.integrator.compiled.columns import Columns
 from symfric.integrator.equations.inputs import InputData
-from symfric.integrator.running.integrator import Integrator
+from symfric.integrator.running.integrator import Integrator, remember
 from symfric.integrator.running.record import Run
 from symfric.model import Model
 from symfric.model.contact import APPLIED, Contact
 from symfric.model.forces import by_laws
+from symfric.model.start import Put
 
 SPEEDS = np.array([1e-6, 1e-3, 1.0, 1e3])
 """Slips [m/s] of the first check, in both directions."""
@@ -90,13 +90,17 @@ def _over_time(
     return integrator.memory[name]([t, y, d], backend="vm")[0].T
 
 
-def _determined(model: Model, write: Callable[[], list[Any]]) -> ca.SX | None:
+Insert = Callable[[], Put]
+"""Function that returns the substitution of the forces of all laws."""
+
+
+def _determined(model: Model, laws: Insert, write: Callable[[], list[Any]]) -> ca.SX | None:
     """Return the expressions of a law with the forces of all laws inserted; None if undetermined.
 
     The law or the unknowns of the model may not determine them.
     """
     try:
-        found = by_laws(model, ca.vertcat(*write()))
+        found = laws()(ca.vertcat(*write()))
     except (ValueError, TypeError, NotImplementedError):
         return None
     known = ca.vertcat(model.t, *(model.vector(letter) for letter in "xzup"))
@@ -152,11 +156,13 @@ def _gains(
 def sliding_places(model: Model) -> tuple[Sliding, ...]:
     """Return the contacts of a model whose steady friction is known."""
     if "sliding" not in model.memory:
-        model.memory["sliding"] = tuple(s for c in model.contacts if (s := _sliding(model, c)))
+        laws = cache(partial(by_laws, model))
+        found = (_sliding(model, c, laws) for c in model.contacts)
+        model.memory["sliding"] = tuple(s for s in found if s)
     return model.memory["sliding"]
 
 
-def _sliding(model: Model, contact: Contact) -> Sliding | None:
+def _sliding(model: Model, contact: Contact, laws: Insert) -> Sliding | None:
     """Return the friction of a contact; None if the unknowns of the model do not determine it."""
     law, v, N, p = contact.law, ca.SX.sym("v"), ca.SX.sym("N"), model.vector("p")
 
@@ -167,13 +173,13 @@ def _sliding(model: Model, contact: Contact) -> Sliding | None:
         there = steady(contact.slip, contact.N, contact.given)
         return [contact.slip, contact.friction, there]
 
-    found = _determined(model, rows)
+    found = _determined(model, laws, rows)
     if found is None:
         return None
     alone = steady(v, N, dict.fromkeys(contact.given, 0.0)) * v
     if strays(alone, ca.vertcat(v, N, p)):
         return None
-    needs = [i for i in range(p.numel()) if ca.depends_on(alone, p[i])]
+    needs = np.flatnonzero(ca.which_depends(alone, p, 1, False)).tolist()
     return Sliding(contact, ca.Function("power", [v, N, p], [alone]), needs, found)
 
 
@@ -264,17 +270,20 @@ def overload(held: Held, ratio: float, when: str = "") -> str:
 def places(model: Model) -> tuple[Held, ...]:
     """Return the contacts of a model whose law sticks through its states."""
     if "held" not in model.memory:
-        model.memory["held"] = tuple(h for c in model.contacts if (h := _held(model, c)))
+        laws = cache(partial(by_laws, model))
+        found = (_held(model, c, laws) for c in model.contacts)
+        model.memory["held"] = tuple(h for h in found if h)
     return model.memory["held"]
 
 
-def _held(model: Model, contact: Contact) -> Held | None:
+def _held(model: Model, contact: Contact, laws: Insert) -> Held | None:
     """Return the force that the states of a contact carry; None if force or level are unknown."""
     if not contact.states or APPLIED in contact.given:
         return None
     z, p = symbols_of(contact.states), model.vector("p")
     force_at, N = contact.law.force, contact.N
-    both = _determined(model, lambda: [force_at(0.0, N, z, **contact.given), contact.most_held])
+    asked = lambda: [force_at(0.0, N, z, **contact.given), contact.most_held]  # noqa: E731
+    both = _determined(model, laws, asked)
     if both is None or not ca.depends_on(both[0], z):
         return None
     (force, level), screen = ca.vertsplit(both), None

@@ -22,12 +22,12 @@ from symfric.integrator.compiled.columns import filled
 from symfric.integrator.compiled.compiler import load
 from symfric.integrator.equations.blocks import Following
 from symfric.integrator.equations.initial import FLOOR, SURE
+from symfric.integrator.methods.attempt import GROWTH_MEMORY, Given, State
 from symfric.integrator.running import crossings as limits
 from symfric.integrator.running.contact_modes import TURNING, ContactModes
 from symfric.integrator.running.crossings import LOOKS, Crossings
 from symfric.integrator.running.events import Change, Eventful, Search, Stop
 from symfric.integrator.running.record import Dense, Outputs, Record
-from symfric.integrator.step.attempt import GROWTH_MEMORY, Given, State
 
 STOPS = tuple(Stop)
 """Reasons to stop, by number."""
@@ -104,10 +104,6 @@ class Work:
             self.breaks, self.data = np.ascontiguousarray(breaks), np.ascontiguousarray(data)
             loop.breaks, loop.data = address(self.breaks), address(self.data)
         self.enter(0)
-
-    def interval(self, times: Array) -> NDArray[np.intp]:
-        """Return the index of the input interval of each time; at a break, the later interval."""
-        return np.searchsorted(self.breaks[1:-1], times, side="right")
 
     def enter(self, interval: int) -> None:
         """Start an input interval: set its end and its data."""

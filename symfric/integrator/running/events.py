@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from symfric.foundation.numeric import Array, Buffered, bound
 from symfric.integrator.equations.initial import SURE
+from symfric.integrator.methods.attempt import Given, State
 from symfric.integrator.running import crossings as limits
 from symfric.integrator.running.crossings import (
     AT_ONCE,
@@ -24,7 +25,6 @@ from symfric.integrator.running.crossings import (
     passed,
 )
 from symfric.integrator.running.record import Jumps, Record
-from symfric.integrator.step.attempt import Given, State
 from symfric.model.parts import Event
 
 JUMPS = 512

@@ -3,22 +3,22 @@
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from threading import Lock
 from time import perf_counter
-from typing import Any, final
+from typing import Any, TypeVar, final
 
 import casadi as ca
 import numpy as np
 
-from symfric.foundation.memory import remember
 from symfric.foundation.numeric import Array, Buffered, Scalar, is_casadi
 from symfric.foundation.programs import CompileError
 from symfric.foundation.variable import stacked
-from symfric.integrator.compiled.background import Prospect
-from symfric.integrator.compiled.columns import Columns
+from symfric.integrator.compiled.columns import Columns, Prospect
 from symfric.integrator.equations.blocks import Following, corrected, following
 from symfric.integrator.equations.initial import consistent
 from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.equations.system import System, system
+from symfric.integrator.methods.attempt import written
 from symfric.integrator.methods.method import Method, suited
 from symfric.integrator.running.contact_modes import ContactModes
 from symfric.integrator.running.crossings import Crossings, crossings
@@ -31,7 +31,6 @@ from symfric.integrator.running.engine import (
     loop_source,
 )
 from symfric.integrator.running.events import Eventful
-from symfric.integrator.step.attempt import written
 from symfric.model import Model
 from symfric.model.kinds import MODE
 
@@ -48,6 +47,19 @@ SPARE = 2
 """Number of buffer sets kept: one for a run, one for a run within its callback."""
 REMEMBERED = 16
 """Number of integrators cached per model; the oldest is dropped first."""
+T = TypeVar("T")
+_LOCK = Lock()
+
+
+def remember(known: dict[Hashable, T], key: Hashable, made: T, most: int) -> T:
+    """Store `made` in `known` unless `key` is present, and return the stored object.
+
+    If `known` has `most` entries, the oldest entry is removed. Threads may share `known`.
+    """
+    with _LOCK:
+        if key not in known and len(known) >= most:
+            del known[next(iter(known))]
+        return known.setdefault(key, made)
 
 
 @final
@@ -65,16 +77,13 @@ class Integrator:
         model, inputs, tableau: model, structure of its inputs, and method.
         whole: system, if its pivots are not those chosen by default; else None.
         memory: objects that other modules derive from the integrator.
-        step: attempt as in `step.attempt`.
-        f: (y, d) -> right-hand sides.
-        events, resets: (t, y, d) -> event expressions, and values of all resets.
+        step: attempt as in `methods.attempt`.
     """
 
     model: Model
     inputs: InputData
     tableau: Method
     whole: System | None = None
-    build_time: float = 0.0
     compile_time: float = 0.0
     vm_time: float = 0.0
     memory: dict[str, Any] = field(default_factory=dict[str, Any])
@@ -84,23 +93,34 @@ class Integrator:
     _spare: list[Work] = field(default_factory=list[Work])
 
     def __post_init__(self) -> None:
-        begin = perf_counter()
         self.system: System = self.whole or system(self.model, self.inputs)
         self.step, self.instructions = written(self.system, self.tableau, INLINE)
-        self.f = ca.Function("f", [self.system.y, self.system.d], [self.system.f])
-        self.events, sizes = self._event_functions()
-        resets = (ca.SX(new) for event in self.model.events for new in event.reset.values())
-        self.resets = self.of_time("resets", stacked(resets))
         self.crossings: Crossings | None = None
         if self.model.events:
-            manifold = self.system.manifold
+            manifold, (events, sizes) = self.system.manifold, self._event_functions
             closes, rows = manifold is not None and manifold.m > 0, self.tableau.H.shape[0]
             self.crossings = crossings(
-                self.model, self.events, sizes, self.resets, rows, self.follows, closes
+                self.model, events, sizes, self.resets, rows, self.follows, closes
             )
         self.prospect = Prospect(self._source, ("symfric_march",), self.instructions)
-        self.build_time = perf_counter() - begin
 
+    @cached_property
+    def f(self) -> ca.Function:
+        """Right-hand sides as a Function (y, d)."""
+        return ca.Function("f", [self.system.y, self.system.d], [self.system.f])
+
+    @property
+    def events(self) -> ca.Function:
+        """Event expressions as a Function (t, y, d)."""
+        return self._event_functions[0]
+
+    @cached_property
+    def resets(self) -> ca.Function:
+        """Values of all resets as a Function (t, y, d)."""
+        resets = (ca.SX(new) for event in self.model.events for new in event.reset.values())
+        return self.of_time("resets", stacked(resets))
+
+    @cached_property
     def _event_functions(self) -> tuple[ca.Function, ca.Function]:
         """Return the Functions (t, y, d) of the event expressions and of their magnitudes.
 

@@ -8,7 +8,8 @@ machine.
 import ctypes
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import final
+from enum import IntEnum
+from typing import ClassVar, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,26 +18,35 @@ from symfric.foundation.numeric import Array, bound, evaluate
 from symfric.integrator.compiled.columns import densified, filled
 from symfric.integrator.compiled.compiler import load
 from symfric.integrator.equations.initial import FLOOR, first_step
+from symfric.integrator.methods.attempt import Given, State
 from symfric.integrator.running.engine import FOLDER, Engine, Work, c_source
 from symfric.integrator.running.events import Eventful, Stop
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.record import Outputs
-from symfric.integrator.step.attempt import Given, State
 
 Counts = NDArray[np.int64]
-END, ATTEMPTS, STEP_TOO_SMALL, SEARCH, AGAIN, STORM, OVER = 0, 2, 3, 4, 5, 6, -1
-"""States of a plant.
 
-END: the plant is at its sample. ATTEMPTS: it is out of attempts. STEP_TOO_SMALL: its steps are too
-small. SEARCH: its algebraic unknowns are too far from the last ones to follow
-(`symfric.integrator.equations.blocks`). AGAIN: the caller has resolved this, and the plant is to be
-continued. STORM: event storm. OVER: a terminal event has ended the plant.
-"""
+
+class Why(IntEnum):
+    """State of a plant.
+
+    END: the plant is at its sample. ATTEMPTS: it is out of attempts. STEP_TOO_SMALL: its steps are
+    too small. SEARCH: its algebraic unknowns are too far from the last ones to follow
+    (`symfric.integrator.equations.blocks`). AGAIN: the caller has resolved this, and the plant is
+    to be continued. STORM: event storm. OVER: a terminal event has ended the plant.
+    """
+
+    OVER = -1
+    END = 0
+    ATTEMPTS = 2
+    STEP_TOO_SMALL = 3
+    SEARCH = 4
+    AGAIN = 5
+    STORM = 6
+
+
 SAMPLES = 1000
 """Number of samples of a run whose first step is that of a plant."""
-REFUSED = -1
-"""Return value of `Advance` if an input is not finite; nothing has changed then."""
-
 Advance = Callable[[int], int]
 """Function that takes over inputs and goes to the next sample (1), or continues AGAIN plants (0).
 
@@ -50,12 +60,12 @@ class Plants:
     """Data of plants of one model; mutable, and shared by both engines.
 
     Attributes:
-        S, R: columns of an attempt, one row per plant (`symfric.integrator.step.attempt`).
+        S, R: columns of an attempt, one row per plant (`symfric.integrator.methods.attempt`).
         u: inputs to hold next, shape (plants, nu); the last run data in R are those held now.
         begin: start times [s]; the k-th sample of a plant is at begin + k dt.
         count: k of each plant; unchanged for a plant that has not reached its sample.
         ready: 1 if the algebraic unknowns already match the inputs to hold next.
-        why: state of each plant, END ... OVER.
+        why: state of each plant, a `Why`.
         made: number of attempts in the last interval.
         dt: sampling interval [s].
         attempts: number of attempts allowed in one interval.
@@ -63,6 +73,9 @@ class Plants:
         memory: event memory, one row per plant; without columns if there are no events.
         happened: (plant, time [s], name) of the events of the last interval.
     """
+
+    REFUSED: ClassVar[int] = -1
+    """Return value of `Advance` if an input is not finite; nothing has changed then."""
 
     S: Array
     R: Array
@@ -138,7 +151,7 @@ def loaded(
 
     def advance(begin: int, _alive: object = (members, plants)) -> int:
         short = int(function(address, begin))
-        if short < REFUSED:
+        if short < Plants.REFUSED:
             raise MemoryError
         return short
 
@@ -153,7 +166,7 @@ def plants_source(integrator: Integrator) -> str:
     plants = filled(
         FOLDER / "plants.c",
         nu=nu, data=data, held=data + n_d - nu, follows=int(follow is not None),
-        search=SEARCH, again=AGAIN, refused=REFUSED,
+        search=Why.SEARCH, again=Why.AGAIN, refused=Plants.REFUSED,
     )  # fmt: skip
     attempts = c_source(integrator.step, integrator.tableau.H.shape[0], *others)
     jump = "" if follow is None else follow.c_source
@@ -190,17 +203,17 @@ class InPython:
         """Advance all plants."""
         plants, S, R = self.plants, self.work.S, self.work.R
         if begin and not np.isfinite(plants.u).all():
-            return REFUSED
+            return Plants.REFUSED
         if begin:
             plants.happened.clear()
         for b in range(plants.S.shape[0]):
-            if plants.why[b] == OVER or not (begin or plants.why[b] == AGAIN):
+            if plants.why[b] == Why.OVER or not (begin or plants.why[b] == Why.AGAIN):
                 continue
             S[:], R[:] = plants.S[b], plants.R[b]
             if self.events is not None:
                 self.events.memory[:] = plants.memory[b]
             follows = self._takes_over(b) if begin else True
-            plants.why[b] = self._runs(b) if follows else SEARCH
+            plants.why[b] = self._runs(b) if follows else Why.SEARCH
             plants.S[b], plants.R[b] = S, R
             if self.events is not None:
                 plants.memory[b] = self.events.memory
@@ -241,8 +254,8 @@ class InPython:
             made += 1
         plants.made[b] += made
         if S[State.T] >= end:
-            return END
-        return ATTEMPTS if _large(S, plants.h_min) else STEP_TOO_SMALL
+            return Why.END
+        return Why.ATTEMPTS if _large(S, plants.h_min) else Why.STEP_TOO_SMALL
 
     def _runs_with(self, events: Eventful, b: int) -> int:
         """Make steps and events up to the sample; return the reason to stop."""
@@ -261,13 +274,13 @@ class InPython:
                 moved = any(model.events[i].reset for i in np.flatnonzero(jumps.which[-1]))
                 closes = moved and manifold is not None and manifold.m
                 if closes or not self._follow():
-                    return SEARCH
+                    return Why.SEARCH
             if stop is Stop.DECIDE:
                 S, d = self.work.S, self.work.R[Given.d(self.integrator.system.nx)].copy()
                 t, before = float(S[State.T]), jumps.before[-1].copy()
                 S[State.Y] = self.integrator.decided(t, before, S[State.Y].copy(), d)
                 events.decided()
-        return ATTEMPTS
+        return Why.ATTEMPTS
 
 
 def _large(S: Array, h_min: float) -> bool:
@@ -278,7 +291,10 @@ def _large(S: Array, h_min: float) -> bool:
 
 EVENTFUL_ATTEMPTS = 50_000
 """Attempts per call of an engine for models with events."""
-WHY = {Stop.END: END, Stop.STEP_TOO_SMALL: STEP_TOO_SMALL, Stop.TERMINAL: OVER, Stop.STORM: STORM}
+WHY = {
+    Stop.END: Why.END, Stop.STEP_TOO_SMALL: Why.STEP_TOO_SMALL, Stop.TERMINAL: Why.OVER,
+    Stop.STORM: Why.STORM,
+}  # fmt: skip
 
 
 def looking(integrator: Integrator, plants: Plants, backend: str) -> Callable[[], Array]:

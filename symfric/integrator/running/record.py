@@ -147,12 +147,6 @@ class Outputs:
             self.values[:, self.found : end] = piece(self.times[self.found : end])
             self.found = end
 
-    def stand(self, t: float, y: Array) -> None:
-        """Set the unknowns at the remaining times up to `t` [s] to the constant `y`."""
-        end = int(np.searchsorted(self.times, t, side="right"))
-        self.values[:, self.found : end] = y[:, None]
-        self.found = max(self.found, end)
-
     def back_to(self, t: float) -> None:
         """Discard values after `t` [s], from steps that were interrupted before they were kept."""
         self.found = min(self.found, int(np.searchsorted(self.times, t, side="right")))

@@ -19,11 +19,11 @@ from symfric.foundation.status import Status
 from symfric.integrator.equations.expressions import pieces
 from symfric.integrator.equations.initial import JammedError, consistent, first_step, smallest_step
 from symfric.integrator.equations.inputs import InputData
+from symfric.integrator.methods.attempt import Given, State
 from symfric.integrator.running.diagnosis import chattering, explain
 from symfric.integrator.running.events import Stop
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.record import MOST_BYTES, Outputs, Run
-from symfric.integrator.step.attempt import Given, State
 
 SMALL, REST = 1e-3, 1e-12
 """Sizes, in nominal values, below which a motion gets its own scale, or counts as zero.

@@ -21,6 +21,12 @@ def fit():
     return identify_robot(urdf(1.3), log(), validation=log(7))
 
 
+@pytest.fixture(scope="module")
+def alone():
+    """Return a fit to one log, with a file whose friction is wrong."""
+    return identify_robot(urdf(dynamics='<dynamics damping="9" friction="9"/>'), log())
+
+
 def moved(seed=5, n=200):
     return waves(seed, np.linspace(0.0, 8.0, n))
 
@@ -138,18 +144,17 @@ def test_inertias_are_consistent_and_stay_near_the_file_where_data_are_silent(fi
     assert np.std(MODEL.torques(q, v, a, np.array(fit.inertial)) - newton_euler(q, v, a)) < 0.1
 
 
-def test_the_updated_urdf_has_the_same_torques_and_replaces_friction(tmp_path):
-    found = identify_robot(urdf(dynamics='<dynamics damping="9" friction="9"/>'), log())
-    assert any("URDF is replaced" in text for text in found.findings)
-    path = found.to_urdf(tmp_path / "new.urdf")
+def test_the_updated_urdf_has_the_same_torques_and_replaces_friction(alone, tmp_path):
+    assert any("URDF is replaced" in text for text in alone.findings)
+    path = alone.to_urdf(tmp_path / "new.urdf")
     assert "<!-- kept -->" in path.read_text()
     new, (q, v, a) = RobotModel.read(path), moved()
-    assert np.allclose(new.torques(q, v, a), new.torques(q, v, a, np.array(found.inertial)))
+    assert np.allclose(new.torques(q, v, a), new.torques(q, v, a, np.array(alone.inertial)))
     file = np.array([[joint.friction, joint.damping] for joint in new.joints])
-    offset = np.array([found.offsets[name] for name in NAMES])
+    offset = np.array([alone.offsets[name] for name in NAMES])
     torques = new.torques(q, v, a) + file[:, 0] * np.sign(v) + file[:, 1] * v + offset
     fast = np.abs(v) > 0.05
-    assert np.abs(torques - found.torques(q, v, a))[fast].max() < 1e-6
+    assert np.abs(torques - alone.torques(q, v, a))[fast].max() < 1e-6
 
 
 def test_a_saved_result_predicts_the_same(fit, tmp_path):
@@ -223,7 +228,7 @@ def test_only_rows_of_the_reversing_joint_are_left_out(fit):
     assert any(np.any(parts["shoulder"] != parts[name]) for name in NAMES[1:])
 
 
-def test_logs_of_different_rates_and_units_are_fitted_together():
+def test_logs_of_different_rates_and_units_are_fitted_together(alone):
     slow = log(3, rate=100.0)[0]
     header = {
         f"{n} [{'mm' if n == 'slide' else 'deg'}]": slow[n] * (1e3 if n == "slide" else 180 / np.pi)
@@ -232,7 +237,7 @@ def test_logs_of_different_rates_and_units_are_fitted_together():
     units = ("N m", "N m", "N")
     torques = {f"{n}_torque [{u}]": slow[f"{n}_torque"] for n, u in zip(NAMES, units, strict=True)}
     other = Dataset.of({"t [s]": slow.time, **header, **torques})
-    both, alone = identify_robot(urdf(), log() + other), identify_robot(urdf(), log())
+    both = identify_robot(urdf(), log() + other)
     for joint, own in TRUTH.items():
         found, before = both.friction[joint]["sigma_2"], alone.friction[joint]["sigma_2"]
         assert abs(found.value - own["sigma_2"]) < 2 * (found.high - found.low)

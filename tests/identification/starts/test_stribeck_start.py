@@ -120,12 +120,14 @@ def record(a: np.ndarray | None = None, m: float = 0.0, offset: float = 0.0) -> 
     return Measured(V, F, t=T, a=a)
 
 
+FEW = record().at([np.arange(0, T.size, 8)])
+
+
 @pytest.mark.parametrize("name", ALL_LAWS)
 def test_start_of_any_law_can_be_constructed(name: str) -> None:
     law = ALL_LAWS[name]()
     free = [n for n, p in parameters(law).items() if p.role not in ASKED]
-    few = record().at([np.arange(0, T.size, 8)])
-    found = start_values(law, few, free=free)
+    found = start_values(law, FEW, free=free)
     assert set(found) == set(free)
     with_values(law, found)
 

@@ -1,4 +1,7 @@
-"""C of every operation, of random graphs, branches and loops has the bits of CasADi."""
+"""C of every operation, of random graphs, branches and loops has the bits of CasADi.
+
+JavaScript has the numbers of CasADi to 1e-12, since the functions of a browser are its own.
+"""
 
 from collections.abc import Callable
 from operator import add, mul, sub, truediv
@@ -7,6 +10,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from one_program import OneProgram
+from scripts import evaluated, in_python, misses, needs_browser, opened
 from tables import Names, table
 
 from symfric import Output, Variable
@@ -214,6 +218,23 @@ def test_operations_have_the_bits_of_casadi_also_at_special_values(everything):
         assert (np.signbit(c) == np.signbit(vm))[zeros[:, i], i].all()
     nodes = graph(everything.several[0].block.step).nodes
     assert {node.op for node in nodes} - LEAVES == set(FORMS) | set(FUNCTIONS) | LOWERED
+
+
+@needs_browser
+def test_javascript_has_the_numbers_of_casadi_also_at_special_values():
+    step = as_block(OPERATIONS).step
+    rows = [((), (), pair) for pair in INPUTS]
+    with opened() as page:
+        off = misses(evaluated(page, step, rows), in_python(step, rows), 1e-12)
+        for k, name in enumerate(OPERATIONS):
+            assert off[:, k].any() == (name in OTHER_AT_NAN), (name, INPUTS[off[:, k]])
+            assert not off[NUMBERS, k].any(), (name, INPUTS[off[:, k]])
+        for block in (*NESTED, places(), as_block(trees(40, 5))):
+            counts = [block.step.numel_in(i) for i in range(3)]
+            random = np.random.default_rng(6)
+            rows = [[random.standard_normal(n) for n in counts] for _ in range(200)]
+            found, expected = evaluated(page, block.step, rows), in_python(block.step, rows)
+            assert not misses(found, expected, 1e-12).any(), block.name
 
 
 def test_random_graphs_have_the_bits_of_casadi_with_branches(everything):

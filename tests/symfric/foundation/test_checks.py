@@ -3,7 +3,6 @@
 Parametric objects: checks, names, symbols.
 """
 
-from collections.abc import Hashable
 from dataclasses import FrozenInstanceError, dataclass
 from math import e, inf, nan, pi
 from pathlib import Path
@@ -16,7 +15,6 @@ from refusing import not_refused
 
 from symfric import Asymmetric, Coulomb, LuGre, SolveError, Status
 from symfric.foundation import checks, numeric
-from symfric.foundation.memory import remember
 from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import (
     Parametric,
@@ -150,15 +148,6 @@ def test_smallest_of_floats_arrays_and_symbols() -> None:
     s = ca.SX.sym("s")
     least = ca.Function("least", [s], [numeric.smallest(2.0, s)])
     assert [float(least(x)) for x in (1.0, 3.0)] == [1.0, 2.0]
-
-
-def test_the_first_remembered_stays_and_the_oldest_goes() -> None:
-    known: dict[Hashable, str] = {}
-    for key, made, kept in ((1, "a", "a"), (1, "b", "a"), (2, "c", "c"), (2, "d", "c")):
-        assert remember(known, key, made, 2) == kept
-    assert known == {1: "a", 2: "c"}
-    assert remember(known, 3, "e", 2) == "e"
-    assert known == {2: "c", 3: "e"}
 
 
 def test_values_are_sentences() -> None:

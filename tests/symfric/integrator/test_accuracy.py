@@ -132,14 +132,18 @@ STIFF_BRISTLES = {
 """Creep of 1e-9 m/s while sticking, for seconds, then a slip that lasts a millisecond."""
 
 
+@cache
+def bristles(case: int) -> sf.Model:
+    p = {name: values[case] for name, values in STIFF_BRISTLES.items()}
+    return sf.rabinowicz(sf.LuGre(v_eps=0.0), free=(), **p)
+
+
 @pytest.mark.parametrize("case", range(4))
 @pytest.mark.parametrize("rtol", [1e-6, 1e-5])
 def test_bristle_under_slowly_growing_load_breaks_away(case: int, rtol: float) -> None:
     """The solution that sticks becomes unstable, and a long implicit step would stay on it."""
-    p = {name: values[case] for name, values in STIFF_BRISTLES.items()}
-    model = sf.rabinowicz(sf.LuGre(v_eps=0.0), free=(), **p)
     start = np.array([0.02, -0.06, 0.01, 0.0167])[case : case + 1]
-    assert worst_break_away(model, start, span=60.0, rtol=rtol) < 2e-3
+    assert worst_break_away(bristles(case), start, span=60.0, rtol=rtol) < 2e-3
 
 
 def stiff(sigma_0: float, v_eps: float) -> sf.Law:
@@ -278,6 +282,7 @@ each_method = pytest.mark.parametrize("method", ADAPTIVE)
 TIMES = np.linspace(0.0, 12.0, 61)
 
 
+@cache
 def decay() -> sf.Model:
     """x' = -k x^3 from 2: x = 2 / sqrt(1 + 8 k t)."""
     x, k = sf.Variable("x", "m", start=2.0), sf.Variable("k", "1/s", start=0.7)

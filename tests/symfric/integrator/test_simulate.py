@@ -7,6 +7,7 @@ Invalid arguments of simulations, ensembles, plants, flows and inputs: one table
 
 import math
 import warnings
+from functools import cache
 from math import exp
 from pathlib import Path
 from typing import Any
@@ -20,10 +21,9 @@ from refusing import not_refused
 
 import symfric as sf
 from symfric import integrator
-from symfric.integrator import arguments, simulate_by_peer
-from symfric.integrator.arguments import LOOSE, check_span, chosen
-from symfric.integrator.methods.tableaux import RADAU5, RODAS5P
-from symfric.integrator.prepared import REMEMBERED
+from symfric.integrator import prepared, simulate_by_peer
+from symfric.integrator.methods.tableaux import LOOSE, RADAU5, RODAS5P, chosen
+from symfric.integrator.prepared import REMEMBERED, check_span
 from symfric.integrator.running import run as running
 
 M, C = 0.8, 2.0
@@ -39,6 +39,7 @@ def by(runner: str, model: sf.Model, t_end: float, **arguments: Any) -> sf.Traje
     return simulate_by_peer(model, t_end, runner, **arguments)
 
 
+@cache
 def cart() -> sf.Model:
     """m v' = force - c v."""
     return sf.drive(sf.Viscous(sigma_2=C), m=M)
@@ -199,7 +200,7 @@ def test_a_failed_solve_reports_the_place_and_keeps_partial_results(runner: str)
 def test_a_long_run_runs_on_and_one_without_progress_stops(monkeypatch: pytest.MonkeyPatch) -> None:
     """With limits scaled down from 10 million attempts and a billion."""
     whole = sf.simulate(sf.rabinowicz(sf.LuGre()), 20.0, backend="vm")
-    for module in (arguments, running):
+    for module in (prepared, running):
         monkeypatch.setattr(module, "MANY_STEPS", 50)
     assert whole.statistics.steps > 200
     found = sf.simulate(sf.rabinowicz(sf.LuGre()), 20.0, backend="vm")

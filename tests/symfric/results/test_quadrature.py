@@ -15,7 +15,7 @@ import symfric as sf
 from symfric.model import Event, Output
 from symfric.multibody import JointSpringDamper, Mechanism, PrescribedMotion, Prismatic, Revolute
 from symfric.results.pictures import plot_trajectories
-from symfric.results.quadrature import extremes, looks
+from symfric.results.signals import extremes, looks
 from symfric.results.trajectory import EnergyBalance
 from symfric.scenes import MECHANISMS, FourBar, FourMass, Pendulum, Prescribed, SliderCrank
 
@@ -191,7 +191,7 @@ def test_drive_lifts_and_pays_for_friction(formulation: str) -> None:
     assert balance.relative < 1e-8
 
 
-SCENES = {"four_mass": (FourMass(LAW), 4.0), "slider_crank": (SliderCrank(LAW), 0.25)}
+SCENES = {"four_mass": (FourMass(LAW), 2.0), "slider_crank": (SliderCrank(LAW), 0.25)}
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -213,7 +213,7 @@ def test_a_wrong_friction_power_shows() -> None:
     off = dict(model.further)
     off[name] = replace(off[name], expression=(1 + 1e-4) * off[name].expression)
     right, wrong = (
-        sf.simulate(m, 1.5, rtol=1e-8).energy_balance()
+        sf.simulate(m, 0.6, rtol=1e-8).energy_balance()
         for m in (model, replace(model, details=lambda: off))
     )
     assert wrong.relative > 1e3 * right.relative
@@ -223,7 +223,7 @@ def test_a_wrong_friction_power_shows() -> None:
 @pytest.mark.parametrize(("method", "order"), [("rodas3", 3), ("rodas5p", 5)])
 def test_the_defect_has_the_order_of_the_method(method: str, order: int) -> None:
     model = FourBar(sf.BrownMcPhee(v_t=0.1)).model()
-    runs = [sf.simulate(model, 0.25, rtol=rtol, method=method) for rtol in (1e-6, 1e-9)]
+    runs = [sf.simulate(model, 0.25, rtol=rtol, method=method) for rtol in (1e-6, 1e-8)]
     steps = [run.statistics.steps for run in runs]
     defects = [abs(run.energy_balance().defect).max() for run in runs]
     found = np.log(defects[0] / defects[1]) / np.log(steps[1] / steps[0])

@@ -134,7 +134,7 @@ def whole(values: object) -> bool:
 @pytest.mark.parametrize("name", MODEL)
 def test_modes_of_a_run_are_whole_numbers_everywhere(name: str, tmp_path: Path) -> None:
     model = MODEL[name]
-    run = sf.simulate(model, 3.0 if name == "loops" else 8.0, rtol=1e-6)
+    run = sf.simulate(model, 1.5 if name == "loops" else 8.0, rtol=1e-6)
     direction = name == "loops" and "x1_loop_direction" not in modes(model)
     assert modes(model) and not direction, "the law has modes"
     between = run.at(np.linspace(*run.span, 3001))

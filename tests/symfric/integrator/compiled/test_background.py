@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from backends import needs_compiler
 
-import symfric.integrator.compiled.background as module
+import symfric.integrator.compiled.columns as module
 from symfric import rabinowicz, simulate
 from symfric.foundation.programs import find_compiler
-from symfric.integrator.compiled.background import Prospect, wait
+from symfric.integrator.compiled.columns import Prospect, wait
 from symfric.integrator.compiled.compiler import compiled_before
 from symfric.laws import BrownMcPhee
 
@@ -153,7 +153,7 @@ def test_failures_are_silent(monkeypatch: pytest.MonkeyPatch, folder: Path) -> N
 
 ENDING = """
 import os, sys
-import symfric.integrator.compiled.background as b
+import symfric.integrator.compiled.columns as b
 b.processors = lambda: 2
 b.Prospect(lambda: "double twice(double x) {{ return 2 * x; }}", ("twice",), 100).pays(1.0)
 while not os.path.getsize({calls!r}): pass

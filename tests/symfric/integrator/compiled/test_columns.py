@@ -4,7 +4,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from symfric.integrator.compiled import background, columns
+from symfric.integrator.compiled import columns
 from symfric.integrator.compiled.columns import CHAINED, SIDE_BY_SIDE, Columns
 
 x, u = ca.SX.sym("x", 2), ca.SX.sym("u")
@@ -75,7 +75,7 @@ def test_auto_compiles_when_that_is_expected_to_save_time(monkeypatch: pytest.Mo
 
     monkeypatch.setitem(columns.__dict__, "plain_load", columns.load)
     monkeypatch.setattr(columns, "load", load)
-    monkeypatch.setattr(background, "processors", lambda: 1)
+    monkeypatch.setattr(columns, "processors", lambda: 1)
     double = Columns(ca.Function("twice", [u], [2 * u]))
     double([np.zeros(1)], backend="auto")
     double.spent = 1.0
@@ -85,7 +85,7 @@ def test_auto_compiles_when_that_is_expected_to_save_time(monkeypatch: pytest.Mo
         double([np.zeros(1)], backend="auto")
     assert ["twice" in source for source in loaded] == [True]
     assert double.spent < 1.1
-    monkeypatch.setattr(background, "find_compiler", lambda: None)
+    monkeypatch.setattr(columns, "find_compiler", lambda: None)
     double = Columns(ca.Function("twice", [u], [2 * u]), spent=100.0)
     (found,) = double([np.array([3.0])], backend="auto")
     np.testing.assert_array_equal(found, [[6.0]])

@@ -18,7 +18,7 @@ from symfric import LuGre, rabinowicz, simulate
 from symfric.cli import main
 from symfric.foundation import programs as finder
 from symfric.foundation.programs import CompileError, Compiler, find_compiler
-from symfric.integrator.compiled import background, compiler
+from symfric.integrator.compiled import columns, compiler
 from symfric.integrator.compiled.compiler import (
     STALE,
     Cache,
@@ -285,7 +285,7 @@ def test_a_broken_compiler_is_an_error_only_where_compiled_code_is_requested(
     chooser = integrator()
     for _ in range(2):
         assert chooser.choose("auto", left=1e6).name == "vm"
-        background.wait()
+        columns.wait()
     with pytest.raises(CompileError, match=message):
         chooser.choose("compiled", left=0.0)
     assert main(["run", "rabinowicz", "--law", "viscous", "--backend", "compiled"]) == 2

@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import sys
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -60,9 +61,19 @@ def test_members_are_those_of_the_cpu(case: str) -> None:
         assert ours.attempts.min() > 0
 
 
+@cache
+def belt() -> Model:
+    return rabinowicz(LuGre())
+
+
+@cache
+def swing() -> Model:
+    return oscillator()
+
+
 def members(backend: str = "cuda") -> Any:
     return simulate_many(
-        rabinowicz(LuGre()), 9.0, x0={"v": VELOCITIES}, t_eval=[0.0, 2.71, 9.0], backend=backend
+        belt(), 9.0, x0={"v": VELOCITIES}, t_eval=[0.0, 2.71, 9.0], backend=backend
     )
 
 
@@ -97,7 +108,7 @@ def test_threads_launches_and_memory_change_nothing(
 
 
 def test_the_budget_of_a_launch_approaches_its_time() -> None:
-    own = integrator(oscillator())
+    own = integrator(swing())
     device = OnDevice.of(own, np.array([0.0, 1.0]), np.array([1.0]), 100, "double")
     budgets = [device.budget]
     for spent in (1e-9, 0.125, 0.5, 2.5):
@@ -108,9 +119,9 @@ def test_the_budget_of_a_launch_approaches_its_time() -> None:
 
 def test_chunks_change_nothing_and_progress_rises_between_launches() -> None:
     reported: list[float] = []
-    whole = simulate_many(oscillator(), 1.0, **TWENTY)
+    whole = simulate_many(swing(), 1.0, **TWENTY)
     for progress in (None, reported.append):
-        assert_same(simulate_many(oscillator(), 1.0, chunk=6, progress=progress, **TWENTY), whole)
+        assert_same(simulate_many(swing(), 1.0, chunk=6, progress=progress, **TWENTY), whole)
     assert reported == sorted(reported)
     assert set(reported) >= {0.3, 0.6, 0.9, 1.0}
 
@@ -119,23 +130,23 @@ def test_an_interrupt_keeps_finished_chunks_and_a_folder_continues(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     given = TWENTY | {"chunk": 4, "out": tmp_path}
-    many = simulate_many(oscillator(), 1.0, progress=after(3), **given)
+    many = simulate_many(swing(), 1.0, progress=after(3), **given)
     assert many.status is Status.INTERRUPTED
     finished = np.isfinite(many["x"][:, 0])
     assert 4 <= finished.sum() < 20
     np.testing.assert_array_equal(finished, np.isfinite(many.reached))
-    again = simulate_many(oscillator(), 1.0, **given)
+    again = simulate_many(swing(), 1.0, **given)
     assert again.status is Status.SUCCESS
-    assert_same(again, simulate_many(oscillator(), 1.0, **TWENTY | {"chunk": 4}))
+    assert_same(again, simulate_many(swing(), 1.0, **TWENTY | {"chunk": 4}))
     assert len(list(tmp_path.iterdir())) == 1
     monkeypatch.setattr(OnDevice, "launched", lambda self, spent: setattr(self, "budget", 5))
-    many = simulate_many(oscillator(), 1.0, progress=after(1), **TWENTY)  # between two launches
+    many = simulate_many(swing(), 1.0, progress=after(1), **TWENTY)  # between two launches
     assert many.status is Status.INTERRUPTED
     assert np.isnan(many.reached).all()
 
 
 def test_the_size_of_a_chunk_depends_on_its_work_and_its_results() -> None:
-    own = integrator(oscillator())
+    own = integrator(swing())
     kernel = Kernel("", DOUBLE, rows=7, given=5, states=2, signals=4, operations=800)
     for times, real, size in (
         (1, "double", 2**30 // 800),

@@ -26,9 +26,9 @@ from symfric.integrator.equations.expressions import (
 )
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.equations.system import system
+from symfric.integrator.methods.attempt import build_fixed, build_step
 from symfric.integrator.methods.tableaux import METHODS
 from symfric.integrator.running.integrator import Integrator
-from symfric.integrator.step.attempt import build_fixed, build_step
 from symfric.laws import Karnopp
 
 Signal = Callable[[ca.SX], ca.SX]

@@ -3,12 +3,14 @@
 import os
 import re
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import casadi as ca
 import numpy as np
 import pytest
+from backends import made
 from device_cases import CASES, VELOCITIES
 from differentiable import oscillator, pendulum, switched
 from ensembles import Inline, after, assert_same, explosive, with_functions_of_libm
@@ -21,6 +23,12 @@ from symfric.integrator.many import members as program_module
 from symfric.model import Event
 
 each_engine = pytest.mark.parametrize("backend", ["vm", "compiled"])
+
+
+@cache
+def of_libm(case: str) -> sf.Model:
+    """The model of a case, whose compiled members have the functions of libm."""
+    return CASES[case][0]()
 
 
 def alone_as(many: sf.Ensemble, m: int, model: sf.Model, t_end: Any, **given: Any) -> None:
@@ -54,8 +62,7 @@ def test_members_are_those_of_simulate(
 ) -> None:
     """With the functions of libm: see `test_functions_of_lanes_change_no_member` for others."""
     with_functions_of_libm(monkeypatch)
-    make, t_end, given = CASES[case]
-    model = make()
+    (_, t_end, given), model = CASES[case], of_libm(case)
     many = sf.simulate_many(model, t_end, backend=backend, chunk=3, **given)
     assert (many.scene, many.units, many.status) == (model.name, model.signals, sf.Status.SUCCESS)
     none = {m for m, why in many.failed.items() if "loops can be closed" in why}
@@ -114,7 +121,7 @@ OWN = {
 def test_members_have_inputs_and_ends_of_their_own(case: str, backend: str) -> None:
     """Some rows do not rise, some members end at a jump, one after a thousandth of the others."""
     (make, u), ends = OWN[case], np.array([1.0, 0.3, 0.95, 0.001, 0.7])
-    model, times = make(), np.array([0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 1.0])  # the jumps among them
+    model, times = made(make), np.array([0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 1.0])  # the jumps among them
     given: dict[str, Any] = {"x0": {"x": 1.25}, "u": {"u": u}, "backend": backend}
     many = sf.simulate_many(model, ends, t_eval=times, chunk=3, **given)
     assert not many.failed
@@ -213,7 +220,7 @@ SHARED: dict[str, tuple[Any, float, dict[str, Any]]] = {
 @pytest.mark.parametrize("case", SHARED)
 def test_every_executor_gives_the_same(case: str, backend: str) -> None:
     make, t_end, given = SHARED[case]
-    model, common = make(), {**given, "backend": backend, "chunk": 2}
+    model, common = made(make), {**given, "backend": backend, "chunk": 2}
     serial = sf.simulate_many(model, t_end, executor="serial", **common)
     every = backend == "compiled" and case in ("fails", "events")
     kinds = EXECUTORS if every else ("threads", "executor of the user")

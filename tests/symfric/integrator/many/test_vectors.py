@@ -16,9 +16,9 @@ from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.many import vectors
 from symfric.integrator.many.members import CompiledMembers, Stretch, many_source
 from symfric.integrator.many.vectors import lanes_header, vector_source
+from symfric.integrator.methods.attempt import Given, State
 from symfric.integrator.methods.tableaux import RODAS5P
 from symfric.integrator.running.integrator import Integrator
-from symfric.integrator.step.attempt import Given, State
 
 LOOP = """
 void apply(const double *x, const double *y, double *out, long long n)

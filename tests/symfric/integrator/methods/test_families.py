@@ -17,6 +17,15 @@ from symfric import Model, SolveError, Status, Variable, flow, simulate, simulat
 from symfric.foundation.numeric import NEAR, exp_phi1_phi2
 from symfric.integrator.equations.initial import consistent, first_guess
 from symfric.integrator.equations.inputs import input_data
+from symfric.integrator.methods.attempt import (
+    KAPPA,
+    Given,
+    State,
+    build_dense_step,
+    build_fixed,
+    build_step,
+    converged,
+)
 from symfric.integrator.methods.families import eliminated, need_ode
 from symfric.integrator.methods.method import combination
 from symfric.integrator.methods.tableaux import (
@@ -29,15 +38,6 @@ from symfric.integrator.methods.tableaux import (
 )
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.record import Dense
-from symfric.integrator.step.attempt import (
-    KAPPA,
-    Given,
-    State,
-    build_dense_step,
-    build_fixed,
-    build_step,
-    converged,
-)
 from symfric.scenes import DoublePendulum, FourBar, MechanismScene, SliderCrank
 
 x = sf.Variable("x", "1", start=1.0)

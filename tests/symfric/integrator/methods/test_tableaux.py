@@ -1,8 +1,13 @@
-"""Coefficients: order conditions, stability, and the orders that are observed in fixed steps."""
+"""Coefficients: order conditions, stability, and the orders that are observed in fixed steps.
+
+Radau IIA: coefficients against exact arithmetic and books, iterations, and stick-slip.
+"""
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
+from fractions import Fraction
 from itertools import combinations_with_replacement
-from math import prod
+from math import comb, perm, prod
 from typing import Any
 
 import casadi as ca
@@ -21,12 +26,24 @@ from closed_forms import (
 )
 from numpy.typing import NDArray
 
-from symfric import Model, Variable
+from symfric import BrownMcPhee, Model, Variable, rabinowicz, simulate
+from symfric.integrator.methods.attempt import build_fixed
 from symfric.integrator.methods.families import Explicit, Rosenbrock
 from symfric.integrator.methods.method import Method
-from symfric.integrator.methods.radau import Radau
-from symfric.integrator.methods.tableaux import ADAPTIVE, DOPRI5, METHODS, shampine
-from symfric.integrator.step.attempt import build_fixed
+from symfric.integrator.methods.tableaux import (
+    ADAPTIVE,
+    DOPRI5,
+    METHODS,
+    RADAU5,
+    RADAU9,
+    Radau,
+    collocation,
+    eigenbasis,
+    error_weights,
+    nodes,
+    shampine,
+    through,
+)
 
 Array = NDArray[np.floating[Any]]
 Tree = tuple["Tree", ...]
@@ -51,12 +68,12 @@ def rooted_trees(order: int) -> list[Tree]:
     return list(forests(order - 1, order - 1))
 
 
-def nodes(tree: Tree) -> int:
-    return 1 + sum(nodes(branch) for branch in tree)
+def size(tree: Tree) -> int:
+    return 1 + sum(size(branch) for branch in tree)
 
 
 def density(tree: Tree) -> int:
-    return nodes(tree) * prod(density(branch) for branch in tree)
+    return size(tree) * prod(density(branch) for branch in tree)
 
 
 def classical(method: Method) -> tuple[Array, Array, Array]:
@@ -84,7 +101,7 @@ def defect(method: Method, weights: Array, tree: Tree, theta: float = 1.0) -> fl
         return np.prod(terms, axis=0) if terms else np.ones(alpha.shape[0])
 
     # beta = (A + 1) G is alpha + Gamma with G = Gamma, since T = I / gamma - C is its inverse
-    return float(weights @ G @ weight(tree)) - theta ** nodes(tree) / density(tree)
+    return float(weights @ G @ weight(tree)) - theta ** size(tree) / density(tree)
 
 
 def last_weights(method: Method) -> Array:
@@ -246,3 +263,100 @@ def test_order_reduction_on_prothero_robinson(name: str) -> None:
     assert observed_order(counts, errors) == pytest.approx(kept, abs=0.15)
     stiffer = [fixed_steps(prothero_robinson(1e7), METHODS[name], n) for n in counts]
     assert max(stiffer) < 0.02 * max(errors)
+
+
+x = Variable("x", "1", start=1.0)
+
+
+def of_stages(s: int) -> Radau:
+    """Radau IIA with s stages and enough iterations to solve its equations."""
+    A = collocation(nodes(s))
+    return replace(RADAU9, A=A, E=error_weights(nodes(s), A), H=through(nodes(s)), iterations=12)
+
+
+@pytest.mark.parametrize("s", [1, 3, 5, 7])
+def test_collocation_matrices_are_those_of_exact_arithmetic(s: int) -> None:
+    """b_j and c_j also satisfy sum_j b_j c_j^k = 1 / (k + 1) up to k = 2 s - 2, and not beyond."""
+    c = nodes(s)
+    exact = np.empty((s, s))
+    for j, node in enumerate(map(Fraction, c)):
+        basis = [Fraction(1)]  # coefficients of the Lagrange polynomial of the node
+        for other in map(Fraction, np.delete(c, j)):
+            by_x, by_one = [Fraction(0), *basis], [*basis, Fraction(0)]
+            pairs = zip(by_x, by_one, strict=True)
+            basis = [(a - other * b) / (node - other) for a, b in pairs]
+        for i, end in enumerate(map(Fraction, c)):
+            integral = (a * end ** (k + 1) / (k + 1) for k, a in enumerate(basis))
+            exact[i, j] = float(sum(integral))
+    A = collocation(c)
+    assert pytest.approx(exact, rel=5e-15, abs=1e-16) == A
+    moments = [float(A[-1] @ c**k) - 1 / (k + 1) for k in range(2 * s)]
+    assert np.abs(moments[:-1]).max() < 2e-15
+    assert abs(moments[-1]) > 1e-10
+
+
+@pytest.mark.parametrize("s", [3, 5, 7])
+def test_error_weights_and_linear_steps_of_any_number_of_stages(s: int) -> None:
+    """One iteration solves x' = -x: R(z) is Pade's of degrees (s - 1, s), exp(z) to order 2 s - 1.
+
+    The error estimate is of order s + 1.
+    """
+    method = of_stages(s)
+    system = assemble(Model("decay", x=(x,), ode=-x.symbol))
+    step = build_fixed(system, replace(method, iterations=1))
+    h = ca.SX.sym("h")
+    estimate = ca.Function("e", [h], [method.trials(system)(ca.SX(1.0), h, ca.SX(0, 1)).error])
+    z = -0.7
+    tops, bottoms = ([comb(s - e, k) / perm(2 * s - 1, k) * (1, -1)[1 - e] ** k
+                      for k in range(s + 1 - e)] for e in (1, 0))  # fmt: skip
+    top, bottom = (sum(a * z**k for k, a in enumerate(rows)) for rows in (tops, bottoms))
+    assert float(step(1.0, -z, [])) == pytest.approx(top / bottom, rel=1e-13)
+    sizes = [abs(float(estimate(h))) for h in (0.8, 0.4, 0.2)]  # above rounding
+    assert observed_order([1, 2, 4], sizes) == pytest.approx(s + 1, abs=0.6)
+
+
+def test_error_weights_are_those_of_hairer_and_wanner_for_three_stages() -> None:
+    assert error_weights(nodes(3), RADAU5.A) == pytest.approx(RADAU5.E, rel=1e-14)
+    assert collocation(nodes(3)) == pytest.approx(RADAU5.A, rel=1e-14)
+
+
+def test_eigenbasis_makes_blocks_of_the_inverse_matrix_of_radau() -> None:
+    """Its eigenvalues are the roots of z^3 - 9 z^2 + 36 z - 60 (Hairer and Wanner)."""
+    basis = eigenbasis(RADAU5.A)
+    (alpha,), (beta,) = basis.alpha, basis.beta
+    expected = [[basis.gamma, 0, 0], [0, alpha, beta], [0, -beta, alpha]]
+    blocks = np.linalg.inv(basis.T) @ np.linalg.inv(RADAU5.A) @ basis.T
+    assert blocks == pytest.approx(np.array(expected), abs=1e-13)
+    assert np.poly(blocks) == pytest.approx([1.0, -9.0, 36.0, -60.0])
+
+
+@pytest.mark.parametrize(("case", "order"), [(smooth_ode(), 7), (smooth_dae(), 5)])
+def test_enough_iterations_solve_the_collocation_equations(case: ClosedForm, order: int) -> None:
+    """The gap to many iterations shrinks by h^2 an iteration, h in algebraic unknowns."""
+    system, y = assemble(case.model), case.exact(0.0)
+    few, many = (build_fixed(system, replace(RADAU5, iterations=k)) for k in (3, 12))
+    gaps = [float(ca.norm_inf(few(y, 1 / n, []) - many(y, 1 / n, []))) for n in (4, 8, 16)]
+    assert observed_order([4, 8, 16], gaps) == pytest.approx(order, abs=0.5)
+
+
+def test_order_nine_takes_a_quarter_of_the_attempts_at_tight_tolerances() -> None:
+    """Of Rodas5P, with smaller errors. An attempt takes about twice the time."""
+    model, span = rabinowicz(BrownMcPhee()), 20.0
+    exact = simulate(model, span, rtol=1e-12, method="rodas4p")["x"]
+    for rtol, ratio in ((1e-8, 0.55), (1e-10, 0.3)):
+        attempts, errors = list[int](), list[float]()
+        for method in ("rodas5p", "radau9"):
+            run = simulate(model, span, rtol=rtol, method=method)
+            attempts.append(run.statistics.steps + run.statistics.rejections)
+            errors.append(float(np.abs(run["x"] - exact).max() / np.abs(exact).max()))
+        assert attempts[1] < ratio * attempts[0]
+        assert errors[1] < 0.5 * errors[0]
+        assert errors[1] < 10 * rtol
+
+
+def test_rounding_stops_radau_with_a_narrow_law_a_decade_before_rodas5p() -> None:
+    model, methods = rabinowicz(BrownMcPhee(v_t=1e-8)), ("rodas5p", "radau5", "radau9")
+    for rtol, able in ((1e-8, [*methods]), (1e-9, ["rodas5p"]), (1e-10, [])):
+        limits = {"rtol": rtol, "max_steps": 4000, "throw": False}
+        runs = {name: simulate(model, 5.0, method=name, **limits) for name in methods}
+        assert [name for name, run in runs.items() if run.status.ok] == able

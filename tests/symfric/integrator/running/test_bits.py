@@ -6,14 +6,14 @@ Virtual machine and compiled loop: the same steps, the same reasons to stop.
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from hashlib import sha256
 from typing import Any
 
 import casadi as ca
 import numpy as np
 import pytest
-from backends import each_backend, needs_compiler
+from backends import bits, each_backend, made, needs_compiler
 from closed_forms import assemble, smooth_ode
 from hybrid import ball
 
@@ -23,13 +23,13 @@ import symfric.integrator.running.integrator as module
 import symfric.integrator.running.run as running
 from symfric import BrownMcPhee, LuGre, Model, rabinowicz
 from symfric.foundation.numeric import Array
+from symfric.integrator.methods.attempt import Given, State, build_step
 from symfric.integrator.methods.tableaux import ADAPTIVE, RODAS5P
 from symfric.integrator.running import run
 from symfric.integrator.running.engine import CompiledEngine, Engine, VmEngine, Work, loop_source
 from symfric.integrator.running.events import Stop
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.run import _March
-from symfric.integrator.step.attempt import Given, State, build_step
 from symfric.laws import ALL_LAWS
 from symfric.scenes import PendulumBox, SliderCrank
 
@@ -82,22 +82,14 @@ CASES: dict[str, Case] = {
 }
 
 
-def numbers(run: sf.Trajectory) -> Iterator[bytes]:
-    """Every bit of a run but how long it took and what ran it."""
-    counts = run.statistics.steps, run.statistics.rejections, run.statistics.smallest_step
-    yield f"{run.message} {run.happened} {counts}".encode()
-    between = run.at(np.linspace(*run.span, 23))
-    for values in (run.t, run.step_times, *(run[n] for n in run.units), *between.values()):
-        yield values.tobytes()
-
-
 def digest(run: sf.Trajectory) -> str:
-    return sha256(b"".join(numbers(run))).hexdigest()
+    return sha256(b"".join(bits(run))).hexdigest()
 
 
-def of_case(case: str, backend: str) -> str:
-    make, t_end, arguments = CASES[case]
-    return digest(sf.simulate(make(), t_end, samples=51, backend=backend, throw=False, **arguments))
+def of_case(case: str, backend: str, model: sf.Model | None = None) -> str:
+    make, t_end, given = CASES[case]
+    model = model or made(make)
+    return digest(sf.simulate(model, t_end, samples=51, backend=backend, throw=False, **given))
 
 
 @needs_compiler
@@ -110,7 +102,8 @@ def test_both_engines_give_the_same_bits(case: str) -> None:
 def test_large_steps_are_blocks_in_both_engines(monkeypatch: pytest.MonkeyPatch) -> None:
     """4f644ad compiled blocks and ran the step written out in the virtual machine."""
     monkeypatch.setattr(module, "INLINE", 100)
-    assert of_case("normal force", "compiled") == of_case("normal force", "vm")
+    model = CASES["normal force"][0]()
+    assert of_case("normal force", "compiled", model) == of_case("normal force", "vm", model)
 
 
 @needs_compiler
@@ -251,7 +244,7 @@ def test_random_runs_have_the_same_bits_by_both_engines(monkeypatch: pytest.Monk
             monkeypatch.setattr(running, "MOST_BYTES", most)
             monkeypatch.setattr(loop, "MOST_ROWS", int(rng.choice([64, 2048])))
             run = sf.simulate(model, t_end, backend=backend, throw=False, **arguments)
-            found.append(list(numbers(run)))
+            found.append(bits(run))
         assert found[0] == found[1], (case, arguments)
 
 

@@ -5,6 +5,7 @@ Every failure is one sentence: when, which equation, what to do; and keeps what 
 
 import warnings
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import casadi as ca
@@ -27,6 +28,7 @@ SLOW = {"m": 2.0, "k": 37.0, "v_belt": 0.03}
 """A belt with a load that grows by 1.1 N/s, of 6.5 N at break-away."""
 
 
+@cache
 def block(**of_law: float) -> sf.Model:
     law = sf.LuGre(mu_s=0.33, mu_d=0.21, **{"v_s": 1e-8, "sigma_1": 2e7, **of_law})
     return Rabinowicz(law, **SLOW).model()
@@ -53,6 +55,7 @@ def test_a_bristle_that_creeps_below_its_width_is_reported() -> None:
     assert quiet(block(sigma_0=1e16, v_eps=1e-18), 20.0, rtol=1e-7).doubts == ""
 
 
+@cache
 def swinging(v_eps: float, amplitude: float = 0.5) -> sf.Model:
     """A mass pulled ever harder over a contact whose load swings."""
     x, v, t = (

@@ -6,7 +6,7 @@ Dense output, values at the times of the result, and the steps that a run keeps.
 import copy
 import gc
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import Any
@@ -14,7 +14,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from backends import each_backend
+from backends import each_backend, made
 
 import symfric as sf
 import symfric.integrator.running.integrator as module
@@ -26,9 +26,18 @@ from symfric.integrator.equations.initial import consistent
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.methods.tableaux import METHODS
 from symfric.integrator.running.crossings import cutting
-from symfric.integrator.running.integrator import REMEMBERED, Integrator, built
+from symfric.integrator.running.integrator import REMEMBERED, Integrator, built, remember
 from symfric.integrator.running.record import Dense, Record, Run, hermite
 from symfric.scenes import PendulumBox, SliderCrank
+
+
+def test_the_first_remembered_stays_and_the_oldest_goes() -> None:
+    known: dict[Hashable, str] = {}
+    for key, new, kept in ((1, "a", "a"), (1, "b", "a"), (2, "c", "c"), (2, "d", "c")):
+        assert remember(known, key, new, 2) == kept
+    assert known == {1: "a", 2: "c"}
+    assert remember(known, 3, "e", 2) == "e"
+    assert known == {2: "c", 3: "e"}
 
 
 @pytest.fixture
@@ -232,7 +241,7 @@ CASES: dict[str, Case] = {
 
 def run_of(case: str, backend: str, **further: Any) -> sf.Trajectory:
     make, arguments = CASES[case]
-    return sf.simulate(make(), 2.0, t_eval=TIMES, backend=backend, **(arguments | further))
+    return sf.simulate(made(make), 2.0, t_eval=TIMES, backend=backend, **(arguments | further))
 
 
 @each_backend

@@ -13,9 +13,9 @@ from symfric.foundation.numeric import Array
 from symfric.integrator.compiled.compiler import load
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.equations.system import system
+from symfric.integrator.methods.attempt import Given, State, build_step
+from symfric.integrator.methods.pieces import Written, all_macros, in_c, macros, routine
 from symfric.integrator.methods.tableaux import METHODS
-from symfric.integrator.step.attempt import Given, State, build_step
-from symfric.integrator.step.pieces import Written, all_macros, in_c, macros, routine
 
 
 def library(*written: Written) -> ctypes.CDLL:

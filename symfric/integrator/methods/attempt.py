@@ -27,6 +27,7 @@ the dense output) or rejects it (h shrinks). The columns of many members are the
 """
 
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Any, NamedTuple, final
 
 import casadi as ca
@@ -38,7 +39,7 @@ from symfric.integrator.equations.blocks import blocks, signs
 from symfric.integrator.equations.manifold import PULLING, SHOCK
 from symfric.integrator.equations.system import System
 from symfric.integrator.methods.method import Method, Trial, Trials
-from symfric.integrator.step.tangent import tangent
+from symfric.integrator.methods.tangent import Tangent
 
 GROWTH_MEMORY = 2.5
 """Largest growth of the step size that the controller stores."""
@@ -180,6 +181,13 @@ Near a singular position such a shift is not an error of the method but a jump t
 
 KAPPA = 0.1
 """Allowed residual of Newton's method, in units of the tolerance."""
+
+
+@lru_cache(maxsize=2)
+def tangent(system: System) -> Tangent | None:
+    """Return the tangent-space form of a mechanism that requests it; None for other systems."""
+    manifold = system.manifold
+    return Tangent(system, manifold) if manifold is not None and manifold.charted else None
 
 
 def steps(system: System, method: Method) -> Trials:

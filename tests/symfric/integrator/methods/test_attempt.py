@@ -17,13 +17,12 @@ from printed_laws import PRINTED
 from scipy.integrate import odeint
 
 import symfric as sf
-import symfric.integrator.step.attempt as module
+import symfric.integrator.methods.attempt as module
 from symfric import BrownMcPhee, ExactCoulomb, LuGre, Model, Variable, Viscous, rabinowicz
 from symfric.bench.multibody import chain
 from symfric.foundation.numeric import Array
 from symfric.integrator.equations.system import System
-from symfric.integrator.methods.tableaux import ADAPTIVE, METHODS, RODAS5P
-from symfric.integrator.step.attempt import (
+from symfric.integrator.methods.attempt import (
     GROW,
     REACH,
     SHRINK,
@@ -37,6 +36,7 @@ from symfric.integrator.step.attempt import (
     obstacles,
     written,
 )
+from symfric.integrator.methods.tableaux import ADAPTIVE, METHODS, RODAS5P
 from symfric.model import Monitor
 from symfric.scenes import Pendulum
 

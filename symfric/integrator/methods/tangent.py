@@ -23,7 +23,6 @@ own tangent space. No step has to choose a basis, and no basis becomes singular.
 Source: Haug, Mech. Based Des. Struct. Mach., 2016-2018 (tangent-space index-0 DAE).
 """
 
-from functools import lru_cache
 from typing import Any, final
 
 import casadi as ca
@@ -226,10 +225,3 @@ class Tangent:
 def _entries(matrix: ca.SX) -> ca.SX:
     """Return the nonzeros of a matrix as a column."""
     return ca.vec(ca.SX(matrix.nz[:]))
-
-
-@lru_cache(maxsize=2)
-def tangent(system: System) -> Tangent | None:
-    """Return the tangent-space form of a mechanism that requests it; None for other systems."""
-    manifold = system.manifold
-    return Tangent(system, manifold) if manifold is not None and manifold.charted else None

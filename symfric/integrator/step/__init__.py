@@ -1,1 +1,0 @@
-"""Attempt of an adaptive step as one CasADi Function."""
