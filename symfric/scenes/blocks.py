@@ -16,17 +16,8 @@ from symfric.model import Model, Output, Variables
 from symfric.model.kinds import FRICTION
 from symfric.model.parts import Sketch
 from symfric.scenes import fields
-from symfric.scenes.base import (
-    Block,
-    GivenInput,
-    Scene,
-    around,
-    contact,
-    drawn,
-    friction_outputs,
-    other_law,
-    structure,
-)
+from symfric.scenes.base import GivenInput, Scene, contact, friction_outputs, other_law, structure
+from symfric.scenes.drawing import Block, around, drawn
 
 
 def sine(t: ca.SX) -> ca.SX:

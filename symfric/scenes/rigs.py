@@ -22,7 +22,8 @@ from symfric.laws.static.machines import tilt
 from symfric.model import Model, Monitor, Output, Variables
 from symfric.model.parts import Sketch
 from symfric.scenes import fields
-from symfric.scenes.base import Block, GivenInput, Scene, contact, drawn, friction_outputs
+from symfric.scenes.base import GivenInput, Scene, contact, friction_outputs
+from symfric.scenes.drawing import Block, drawn
 
 
 def strokes(t: ca.SX) -> ca.SX:

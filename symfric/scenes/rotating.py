@@ -15,15 +15,8 @@ from symfric.laws.base import smooth
 from symfric.model import Model, Output, Variables
 from symfric.model.parts import Sketch
 from symfric.scenes import fields
-from symfric.scenes.base import (
-    Block,
-    GivenInput,
-    Scene,
-    contact,
-    drawn,
-    friction_outputs,
-    structure,
-)
+from symfric.scenes.base import GivenInput, Scene, contact, friction_outputs, structure
+from symfric.scenes.drawing import Block, drawn
 
 
 def closing(t: ca.SX) -> ca.SX:
