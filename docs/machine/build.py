@@ -48,7 +48,7 @@ def make_all(say: Say) -> list[str]:
     failed = run_pages(say)
     failed += draw("laws", items.every(), items.draw_law, say)
     failed += draw("scenes", items.ALL_SCENES, items.draw_scene, say)
-    failed += draw("sliders", items.ALL_LAWS, sliders.draw_sliders, say, ".html")
+    failed += draw("sliders", items.ALL_LAWS, sliders.draw_sliders, say, ".html", sliders.TEXT)
     failed += make_gallery(say)
     write("gallery", gallery_pages())
     return failed
@@ -162,11 +162,16 @@ def _run_page(say: Say, task: tuple[Path, str]) -> str:
 
 def draw(
     kind: str, names: Iterable[str], function: Callable[[str, Path], None], say: Say,
-    ending: str = ".png",
+    ending: str = ".png", text: str = "",
 ) -> list[str]:  # fmt: skip
-    """Let `function(name, folder)` draw each of `names`; return a text for each failure."""
+    """Let `function(name, folder)` draw each of `names`; return a text for each failure.
+
+    Args:
+        ending: ending of the name of each result.
+        text: what the results contain, besides what code makes.
+    """
     folder, names = MADE / kind, list(names)
-    key = digest([code_key(), code_of(Path(inspect.getfile(function))), kind, *names])
+    key = digest([code_key(), code_of(Path(inspect.getfile(function))), kind, text, *names])
     if is_fresh(folder, key, (f"{name}{ending}" for name in names)):
         return []
     say(f"drawing {len(names)} pictures of {kind}")

@@ -217,12 +217,15 @@ def scene_page(name: str, kind: type[Scene]) -> str:
     scene = kind(RUBS())
     model, law = scene.model(), law_name(RUBS())
     rst = f".. autoclass:: symfric.scenes.{kind.__name__}\n"
-    text = f"# {name.replace('_', ' ').capitalize()}\n\n" + directive("eval-rst", "", rst)
+    about = f"bodies, elements, directions and contacts of {name}"
+    caption = "Coordinates and velocities are blue, inputs green, contacts with friction and their "
+    caption += f"loads orange, by `symfric scenes {name} --schematic FILE`"
+    picture = f"/made/scenes/{name}_schematic.png"
+    text = f"# {name.replace('_', ' ').capitalize()}\n\n"
+    text += directive("figure", picture, caption, alt=about, width="24rem")
+    text += directive("eval-rst", "", rst)
     text += f"The name on the command line is `{name}`. In Python, use "
     text += f"`from symfric.scenes import {kind.__name__}`.\n\n"
-    if model.sketch is not None:
-        about = f"{name} at an instant of this run"
-        text += directive("figure", f"/made/scenes/{name}_sketch.png", alt=about, width="24rem")
     caption = f"{name} with {law} friction over {kind.t_end:g} s, by "
     caption += code(f"symfric run {name} --law {law}")
     text += directive("figure", f"/made/scenes/{name}.png", caption, alt=f"run of {name}")
@@ -278,18 +281,11 @@ def draw_law(name: str, folder: Path) -> None:
 
 
 def draw_scene(name: str, folder: Path) -> None:
-    """Draw the run of a scene, and the machine at an instant of it."""
-    import numpy as np  # noqa: PLC0415
-
+    """Draw the run of a scene, and its schematic."""
     from symfric import simulate  # noqa: PLC0415
-    from symfric.results.animation import picture  # noqa: PLC0415
 
     kind = ALL_SCENES[name]
-    model = kind(RUBS()).model()
     inputs = {n: given.function for n, given in kind.inputs.items()}
-    run = simulate(model, kind.t_end, u=inputs or None)
+    run = simulate(kind(RUBS()).model(), kind.t_end, u=inputs or None)
     run.plot(path=folder / f"{name}.png")
-    if model.sketch is not None:
-        figure, pose = picture(run, np.linspace(0.0, kind.t_end, 40))
-        pose(3)  # most machines move then
-        figure.savefig(folder / f"{name}_sketch.png", dpi=110)
+    kind(RUBS()).schematic(folder / f"{name}_schematic.png")

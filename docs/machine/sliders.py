@@ -32,6 +32,9 @@ HERE = Path(__file__).parent
 STATIC = HERE.parent / "static"
 SHARED = (STATIC / "sliders.js", STATIC / "sliders.css")
 """Files that all pages with sliders load."""
+PAGE = HERE / "sliders.html"
+TEXT = f"{PAGE.read_text('utf-8')}{LIBRARY}{TEXTS['sliders']}"
+"""Texts of all pages with sliders."""
 MOST = 60_000
 """Largest size of the sliders of a page with the files that they load [bytes]."""
 CHOICES = (
@@ -245,7 +248,7 @@ def written(name: str, law: Law) -> str:
     }
     made = {"steady": steady(law)} | {n: r.step for n, r in found.items()}
     values = {"law": name, "about": json.dumps(about), "functions": scripts(made)}
-    text = filled(HERE / "sliders.html", **values)
+    text = filled(PAGE, **values)
     size = len(text.encode()) + sum(path.stat().st_size for path in SHARED)
     if size > MOST:
         raise ValueError(f"sliders of {name}: expected at most {MOST} bytes, got {size}")
