@@ -14,9 +14,10 @@ from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.equations.system import System, system
 from symfric.integrator.methods.tableaux import METHODS
 from symfric.laws import Law
-from symfric.multibody import JointFriction, Mechanism, Prismatic, Spherical, prepare
+from symfric.multibody import JointFriction, Mechanism, Prismatic, Spherical, UserForce, prepare
+from symfric.multibody.equations import Equations
 from symfric.multibody.kinematics import Cuts
-from symfric.scenes import FourBar, FourMass, PendulumBox, SliderCrank
+from symfric.scenes import FourBar, FourMass, Pendulum, PendulumBox, SliderCrank
 
 LAW = BrownMcPhee(v_t=0.01)
 
@@ -92,6 +93,18 @@ def test_user_forces_move_the_mechanism_as_its_law_would() -> None:
     one, other = (simulate(m, 0.3, rtol=1e-9) for m in (model, again))
     for name, signal in one.signals.items():
         np.testing.assert_allclose(other[name][-1], signal[-1], rtol=1e-5, atol=1e-6)
+
+
+def test_a_build_writes_each_load_and_each_mass_matrix_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Checks and start values take the loads and the mass matrix of the equations."""
+    made, of_mass = list[str](), Equations.mass.func
+    monkeypatch.setattr(Equations.mass, "func", lambda eq: made.append("mass") or of_mass(eq))
+    m = Pendulum(LAW).mechanism()
+    m.force(UserForce("push", "rod", lambda kin: made.append("push") or (X, X)))
+    m.build()
+    assert sorted(made) == ["mass", "push"]
 
 
 def test_width_of_the_normal_force_is_a_parameter_on_request() -> None:

@@ -187,6 +187,15 @@ def test_steady_friction_of_no_law_adds_energy(name: str) -> None:
         assert not sliding.suspect(model.values("p"))
 
 
+def test_laws_are_not_inserted_for_friction_that_only_brakes(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked = list[str]()
+    monkeypatch.setattr(doubts, "by_laws", lambda model: asked.append(model.name))
+    sf.simulate(ALL_SCENES["arm"](sf.LuGre()).model(), 1e-3, backend="vm", samples=2)
+    assert asked == []
+
+
 def test_bristles_that_return_stored_energy_are_not_reported() -> None:
     """A block at rest on stretched bristles: at first friction does nothing but push it."""
     with warnings.catch_warnings():

@@ -109,6 +109,13 @@ def wave(model: Model, k: int) -> tuple[Integrator, bool]:
     return built(model, inputs, METHODS["rodas3"])
 
 
+def test_a_run_builds_only_the_functions_that_it_needs() -> None:
+    model = cart()
+    simulate(model, 0.1, backend="vm", samples=2)
+    (integrator,) = model.memory["integrators"].values()
+    assert not {"f", "resets", "_event_functions", "signals"} & vars(integrator).keys()
+
+
 def test_a_model_that_was_simulated_dies_with_its_last_reference() -> None:
     """4f644ad kept every model for ever: 0.12 MB each, 3.7 MB an arm."""
     seen = list[weakref.ref[object]]()
