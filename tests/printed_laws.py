@@ -211,7 +211,7 @@ def mixed_lubrication(p: Any, v: float, N: float) -> float:
     """With the load as the law rounds it, over N_eps."""
     H = p.eta * v / (N / p.A)
     share = (N**2 + p.N_eps**2) / N**2
-    return p.mu_b * N * tanh(v / p.v_eps) * share / (share + (H / p.H_m) ** 2) + N * H / p.h
+    return p.mu_b * N * tanh(v / p.v_eps) * share / (share + (H / p.H_m) ** 2) + N * H / p.h_0
 
 
 def brush_tyre(p: Any, v: float, N: float, v_r: float = 0.0) -> float:

@@ -45,7 +45,14 @@ def test_it_holds_every_module_of_a_package(wheel: ZipFile, package: str) -> Non
     assert not [n for n in held if "test" in n]
 
 
-@pytest.mark.parametrize("name", [*(f"{p}/py.typed" for p in PACKAGES), "symfric/CONVENTIONS.md"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        *(f"{p}/py.typed" for p in PACKAGES),
+        "symfric/CONVENTIONS.md",
+        "symfric/emitter/functions.js",
+    ],
+)
 def test_it_holds_what_is_not_code(wheel: ZipFile, name: str) -> None:
     assert name in wheel.namelist()
 

@@ -7,6 +7,7 @@ all results.
 
 import ast
 import hashlib
+import inspect
 import json
 import os
 import re
@@ -20,7 +21,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-from docs.machine import items, lists, measure
+from docs.machine import items, lists, measure, sliders
 from docs.machine.items import cards
 from docs.machine.markdown import block, contents, directive, opening, plain, table
 from docs.machine.pages import DOCS, ROOT, blocks, made_pictures, written_pages
@@ -47,6 +48,7 @@ def make_all(say: Say) -> list[str]:
     failed = run_pages(say)
     failed += draw("laws", items.every(), items.draw_law, say)
     failed += draw("scenes", items.ALL_SCENES, items.draw_scene, say)
+    failed += draw("sliders", items.ALL_LAWS, sliders.draw_sliders, say, ".html", sliders.TEXT)
     failed += make_gallery(say)
     write("gallery", gallery_pages())
     return failed
@@ -159,12 +161,18 @@ def _run_page(say: Say, task: tuple[Path, str]) -> str:
 
 
 def draw(
-    kind: str, names: Iterable[str], function: Callable[[str, Path], None], say: Say
-) -> list[str]:
-    """Let `function(name, folder)` draw each of `names`; return a text for each failure."""
+    kind: str, names: Iterable[str], function: Callable[[str, Path], None], say: Say,
+    ending: str = ".png", text: str = "",
+) -> list[str]:  # fmt: skip
+    """Let `function(name, folder)` draw each of `names`; return a text for each failure.
+
+    Args:
+        ending: ending of the name of each result.
+        text: what the results contain, besides what code makes.
+    """
     folder, names = MADE / kind, list(names)
-    key = digest([code_key(), code_of(Path(items.__file__)), kind, *names])
-    if is_fresh(folder, key, (f"{name}.png" for name in names)):
+    key = digest([code_key(), code_of(Path(inspect.getfile(function))), kind, text, *names])
+    if is_fresh(folder, key, (f"{name}{ending}" for name in names)):
         return []
     say(f"drawing {len(names)} pictures of {kind}")
     workers = min(os.cpu_count() or 1, len(names))

@@ -14,7 +14,16 @@ from symfric import ALL_LAWS, POPULATIONS, BrownMcPhee, Exact, Table, law_name, 
 from symfric.cli.laws import costs
 from symfric.figures.data import phenomena
 from symfric.foundation.parameters import options
-from symfric.laws import PHENOMENA, AnyLaw, Asymmetric, LoadDependent, PlanarSlip, SpatialSlip, Sum
+from symfric.laws import (
+    PHENOMENA,
+    AnyLaw,
+    Asymmetric,
+    LoadDependent,
+    PlanarSlip,
+    Population,
+    SpatialSlip,
+    Sum,
+)
 from symfric.laws.composed.populations import cost
 from symfric.laws.composed.wrap import Lagged, LoadNormalised, TemperatureDependent
 from symfric.scenes import ALL_SCENES, Scene
@@ -111,6 +120,7 @@ def law_page(name: str, law: AnyLaw) -> str:
     text += f"The name on the command line is `{name}`. In Python, use "
     text += f"`from symfric import {kind.__name__}`.\n\n"
     text += directive("figure", f"/made/laws/{name}.png", alt=f"{name} with default parameters")
+    text += sliders_of(name, law)
     facts = [
         ["shows", ", ".join(PHENOMENA[code] for code in phenomena(law))],
         ["smoothness", law.facts.smoothness],
@@ -142,6 +152,15 @@ def law_page(name: str, law: AnyLaw) -> str:
     if type(law) in ALL_LAWS.values() and not getattr(law, "inputs", ()):
         lines.append(f"$ symfric run rabinowicz --law {name} --plot run.png")
     return text + "## Use\n\n" + block("\n".join(lines), "console")
+
+
+def sliders_of(name: str, law: AnyLaw) -> str:
+    """Return the section with the sliders of a law, or the reason why it has none."""
+    said = TEXTS["sliders"]
+    if isinstance(law, Population):
+        return f"{said['population']}\n\n"
+    raw = directive("raw", "html", file=f"../made/sliders/{name}.html")
+    return f"## {said['title']}\n\n{said['text']}{raw}"
 
 
 def signature(kind: type[Any]) -> str:
@@ -198,12 +217,15 @@ def scene_page(name: str, kind: type[Scene]) -> str:
     scene = kind(RUBS())
     model, law = scene.model(), law_name(RUBS())
     rst = f".. autoclass:: symfric.scenes.{kind.__name__}\n"
-    text = f"# {name.replace('_', ' ').capitalize()}\n\n" + directive("eval-rst", "", rst)
+    about = f"bodies, elements, directions and contacts of {name}"
+    caption = "Coordinates and velocities are blue, inputs green, contacts with friction and their "
+    caption += f"loads orange, by `symfric scenes {name} --schematic FILE`"
+    picture = f"/made/scenes/{name}_schematic.png"
+    text = f"# {name.replace('_', ' ').capitalize()}\n\n"
+    text += directive("figure", picture, caption, alt=about, width="24rem")
+    text += directive("eval-rst", "", rst)
     text += f"The name on the command line is `{name}`. In Python, use "
     text += f"`from symfric.scenes import {kind.__name__}`.\n\n"
-    if model.sketch is not None:
-        about = f"{name} at an instant of this run"
-        text += directive("figure", f"/made/scenes/{name}_sketch.png", alt=about, width="24rem")
     caption = f"{name} with {law} friction over {kind.t_end:g} s, by "
     caption += code(f"symfric run {name} --law {law}")
     text += directive("figure", f"/made/scenes/{name}.png", caption, alt=f"run of {name}")
@@ -259,18 +281,11 @@ def draw_law(name: str, folder: Path) -> None:
 
 
 def draw_scene(name: str, folder: Path) -> None:
-    """Draw the run of a scene, and the machine at an instant of it."""
-    import numpy as np  # noqa: PLC0415
-
+    """Draw the run of a scene, and its schematic."""
     from symfric import simulate  # noqa: PLC0415
-    from symfric.results.animation import picture  # noqa: PLC0415
 
     kind = ALL_SCENES[name]
-    model = kind(RUBS()).model()
     inputs = {n: given.function for n, given in kind.inputs.items()}
-    run = simulate(model, kind.t_end, u=inputs or None)
+    run = simulate(kind(RUBS()).model(), kind.t_end, u=inputs or None)
     run.plot(path=folder / f"{name}.png")
-    if model.sketch is not None:
-        figure, pose = picture(run, np.linspace(0.0, kind.t_end, 40))
-        pose(3)  # most machines move then
-        figure.savefig(folder / f"{name}_sketch.png", dpi=110)
+    kind(RUBS()).schematic(folder / f"{name}_schematic.png")

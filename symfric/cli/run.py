@@ -205,7 +205,7 @@ def check_movie(path: Path | None, scene: str, model: Model) -> None:
     """
     if path is None:
         return
-    if model.sketch is None:
+    if model.sketch is None or model.sketch().still:
         raise ValueError(
             f"--animate: expected a scene with geometry, such as {', '.join(MECHANISMS)}, got "
             f"{scene}; --plot shows its signals"

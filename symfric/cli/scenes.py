@@ -29,23 +29,28 @@ def scenes(
     preset: str | None = None,
     law_of: Strings = None,
     plot: Path | None = None,
+    schematic: Path | None = None,
     json: str | None = None,
 ) -> None:
     """List the scenes, or show one in full.
 
     A scene in full has equations, limits, source, inputs with defaults, parameters with units and
-    bounds, results, contacts that accept a separate law, presets of papers, and a picture of a run.
+    bounds, results, contacts that accept a separate law, presets of papers, a picture of a run, and
+    a labelled schematic.
 
     Example: symfric scenes drive
+
+    Example: symfric scenes drive --schematic drive.png
 
     Example: symfric scenes pendulum_box --law lugre --preset jing_mi_table_7 --plot box.png
     """
     opt.check_outputs(json, picture=plot)
+    opt.check_outputs(picture=schematic)
     if name is None:
-        if any((law, settings, preset, law_of, plot)):
+        if any((law, settings, preset, law_of, plot, schematic)):
             raise ValueError(
-                "--law, --set, --preset, --law-of, --plot: expected the name of a scene before "
-                "them, got none"
+                "--law, --set, --preset, --law-of, --plot, --schematic: expected the name of a "
+                "scene before them, got none"
             )
         rows = [summary(scene, kind(Viscous())) for scene, kind in ALL_SCENES.items()]
         return output.finish({"scenes": rows}, json, partial(show_list, rows))
@@ -65,7 +70,9 @@ def scenes(
         )
         plot_trajectories(run, path=plot)
         refuse_failed(run.values())
-    return output.finish(found, json, partial(show_scene, found), plot)
+    if schematic:
+        machine.schematic(schematic)
+    return output.finish(found, json, partial(show_scene, found), plot, schematic)
 
 
 def summary(name: str, machine: Scene) -> dict[str, Any]:

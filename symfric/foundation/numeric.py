@@ -201,6 +201,12 @@ def address(array: Array) -> int:
     return array.ctypes.data
 
 
+def nonzeros(matrix: ca.SX) -> list[ca.SX]:
+    """Return the structural nonzeros of a matrix, column by column."""
+    found: Any = matrix.nonzeros()  # SX at run time
+    return found
+
+
 LEAVES = frozenset({ca.OP_INPUT, ca.OP_CONST})
 
 Made = TypeVar("Made")

@@ -197,7 +197,12 @@ def png(figure: "Figure", dpi: float = 100) -> bytes:
 
 def data_uri(figure: "Figure", dpi: float = 60) -> str:
     """Return `figure` as a data URI for the `src` of an HTML image."""
-    return "data:image/png;base64," + b64encode(png(figure, dpi)).decode()
+    return png_uri(png(figure, dpi))
+
+
+def png_uri(content: bytes) -> str:
+    """Return the bytes of a PNG file as a data URI."""
+    return "data:image/png;base64," + b64encode(content).decode()
 
 
 SHORT = 8

@@ -109,7 +109,8 @@ def check_si(where: str, value: object) -> None:
 
 def stacked(rows: Iterable[Scalar]) -> ca.SX:
     """Return `rows` as a column SX (n, 1), which may be empty."""
-    return ca.vertcat(ca.SX(0, 1), *rows)
+    empty, rows = ca.SX(0, 1), tuple(rows)
+    return ca.vertcat(empty, *rows) if rows else empty
 
 
 def symbols_of(variables: Iterable[Variable]) -> ca.SX:
@@ -124,14 +125,17 @@ def starts_of(variables: Iterable[Variable]) -> ca.SX:
 
 def at_start(expression: Scalar, variables: Sequence[Variable]) -> ca.DM:
     """Return the value of `expression` at the start values of its symbols, `variables`."""
-    starts = ca.SX(starts_of(variables))
-    return ca.DM(ca.substitute(ca.SX(expression), symbols_of(variables), starts))
+    found = ca.SX(expression)
+    if not found.is_constant():
+        found = ca.substitute(found, symbols_of(variables), starts_of(variables))
+    return ca.DM(found)
 
 
 def undeclared(expression: Scalar, known: ca.SX) -> list[ca.SX]:
     """Return the symbols in `expression` that are not in `known`, without duplicates."""
-    declared = {symbol.__hash__() for symbol in ca.symvar(known)}
-    return [s for s in ca.symvar(ca.SX(expression)) if s.__hash__() not in declared]
+    used = ca.symvar(ca.SX(expression))
+    declared = {symbol.__hash__() for symbol in ca.symvar(known)} if used else ()
+    return [s for s in used if s.__hash__() not in declared]
 
 
 def strays(expression: Scalar, known: ca.SX) -> list[str]:

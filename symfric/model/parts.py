@@ -237,6 +237,7 @@ class Part:
             a block.
         ends: indices of places that have only springs and dampers.
         fixed: True for the ground, which has no lines.
+        label: symbol or value of the mass or inertia.
     """
 
     name: str
@@ -244,6 +245,7 @@ class Part:
     corners: tuple[int, ...]
     ends: tuple[int, ...] = ()
     fixed: bool = False
+    label: str = ""
 
 
 @final
@@ -253,7 +255,9 @@ class Symbol:
 
     Attributes:
         marker: shape of the marker at b; empty for no marker.
-        line: line from a to b: "rod", "spring" or "damper"; empty for no line.
+        line: line from a to b: "rod", "spring", "damper", or "strut" for a spring and a damper;
+            "circle" about a through b, "spiral" for a torsion spring at b, "link" for a gear or a
+            belt; empty for no line.
         axes: lines through b along axes of a or b, each given as ("a" or "b", number of the axis).
         hinge: True for a pure rotation about z of b.
         guide: True for sliding along z of a.
@@ -289,6 +293,8 @@ class Mark:
         slips: name of the sliding velocity of each contact, and the velocity [m/s] below which the
             contact counts as sticking.
         grounded: True if a is on the ground.
+        contacts: names of the contacts with friction of this element.
+        label: symbols or values of stiffness and damping.
     """
 
     name: str
@@ -297,6 +303,28 @@ class Mark:
     b: int
     slips: tuple[tuple[str, float], ...] = ()
     grounded: bool = False
+    contacts: tuple[str, ...] = ()
+    label: str = ""
+
+
+@final
+@dataclass(frozen=True)
+class Arrow:
+    """Positive direction of coordinates, velocities, forces or inputs.
+
+    Attributes:
+        names: names of the quantities, such as a coordinate and its rate.
+        at: index of the place at the arrow.
+        frame: index of the place whose axes `axis` refers to.
+        axis: direction, or axis of rotation.
+        turning: True for a rotation.
+    """
+
+    names: tuple[str, ...]
+    at: int
+    frame: int
+    axis: tuple[float, float, float]
+    turning: bool = False
 
 
 @final
@@ -310,9 +338,18 @@ class Sketch:
         parts: bodies.
         marks: elements between the places.
         symbols: size of the symbols of joints relative to their size in a mechanism.
+        arrows: positive directions, drawn in a schematic.
+        layout: arrangement in a schematic, if it differs from that in motion.
     """
 
     places: ca.SX
     parts: tuple[Part, ...]
     marks: tuple[Mark, ...]
     symbols: float = 1.0
+    arrows: tuple[Arrow, ...] = ()
+    layout: "Sketch | None" = None
+
+    @property
+    def still(self) -> bool:
+        """True if nothing in the drawing moves."""
+        return self.places.is_constant()

@@ -142,11 +142,12 @@ def equation_problems(model: System, known: ca.SX) -> list[str]:
     for event in model.events:
         single[f"event '{event.name}'"] = event.expression
         single |= {f"event '{event.name}', {n}": value for n, value in event.reset.items()}
-    long = [name for name, expression in single.items() if ca.SX(expression).numel() != 1]
+    columns = {name: ca.vec(expression) for name, expression in single.items()}
+    long = [name for name, column in columns.items() if column.numel() != 1]
     if long:
         problems.append(f"expected scalar expressions, got {', '.join(long)}")
     equations = model.residual if model.ode is None else ca.veccat(model.ode, model.alg)
-    stray = strays(ca.veccat(equations, *map(ca.SX, single.values())), known)
+    stray = strays(ca.vertcat(ca.vec(equations), *columns.values()), known)
     if stray:
         problems.append(
             f"expected only declared symbols, got {', '.join(stray)}; {_declare(stray, known)}"

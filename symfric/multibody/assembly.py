@@ -161,15 +161,18 @@ def _inner(cut: Equations, eq: Equations, contacts: Sequence[Slip]) -> Inner | N
         [ca.vertcat(cut.a, cut.F, cut.N)],
         [ca.vertcat(eq.a, stacked(s.force for s in contacts), eq.N)],
     )
-    kept = cuts.needed(f)
+    kept, symbols = cuts.needed(f), cuts.symbols
+    of_link: list[list[ca.SX]] = [[] for _ in links]
+    for i in kept:
+        of_link[cuts.links[i]].append(symbols[i])
     groups: list[ca.SX] = []
     for k, link in reversed(list(enumerate(links))):
         # inner unknowns first: their right-hand sides are zero, so they cost no stage
-        groups.append(stacked(cuts.symbols[i] for i in kept if cuts.links[i] == k))
+        groups.append(stacked(of_link[k]))
         groups.append(ca.vertcat(*(column[link.rows] for column in (eq.q, eq.qd, eq.a))))
         own = (s for s in contacts if s.contact.link == link.joint.name)
         groups.append(symbols_of(v for s in own for v in (*s.unknown, *s.states)))
-    return Inner(cuts.symbols[kept], values[kept], f, tuple(groups))
+    return Inner(symbols[kept], values[kept], f, tuple(groups))
 
 
 def _pressing(contacts: Sequence[Slip], reactive: ca.SX) -> tuple[ca.SX, tuple[str, ...], str]:
@@ -244,10 +247,11 @@ def _outputs(
         found[f"{name}_friction"] = Output(size, force, doc, kinds.FRICTION)
         power = ca.dot(s.force, contact.slip)
         found[f"{name}_power"] = Output(power, "W", "power dissipated by friction", kinds.FRICTION)
+    kinetic, potential = eq.kinetic, eq.potential
     for name, value, doc in (
-        ("kinetic", eq.kinetic, "kinetic energy"),
-        ("potential", eq.potential, "potential energy"),
-        ("energy", eq.kinetic + eq.potential, "kinetic and potential energy"),
+        ("kinetic", kinetic, "kinetic energy"),
+        ("potential", potential, "potential energy"),
+        ("energy", kinetic + potential, "kinetic and potential energy"),
     ):
         found[name] = Output(value, "J", doc, kinds.ENERGY)
     if eq.m:

@@ -156,8 +156,8 @@ def rubbing(
 def undeclared(where: str, values: Iterable[object], known: ca.SX, expected: str) -> Iterator[str]:
     """Yield messages about undeclared symbols in `values`."""
     flat = [x for value in values for x in (value if isinstance(value, tuple | list) else [value])]
-    stray = strays(ca.veccat(*(x for x in flat if isinstance(x, ca.SX))), known)
-    if stray:
+    used = [x for x in flat if isinstance(x, ca.SX) and not x.is_constant()]
+    if used and (stray := strays(ca.veccat(*used), known)):
         hint = f"pass the variable, build(p=({stray[0]},))"
         yield f"{where}: expected only declared {expected}, got {', '.join(stray)}; {hint}"
 
@@ -193,8 +193,8 @@ def undeclared_in_forces(made: Prepared) -> Iterator[str]:
     eq = made.eq
     known = ca.vertcat(eq.q, eq.qd, eq.angles, symbols_of((*made.p, *made.u)), eq.kin.t)
     expected = "positions, velocities, time, parameters and inputs"
-    for force in eq.forces:
-        parts = [x for load in force.loads(eq.kin) for x in _parts(load)]
+    for force, loads in zip(eq.forces, eq.loads, strict=True):
+        parts = [x for load in loads for x in _parts(load)]
         yield from undeclared(f"force '{force.name}'", parts, known, expected)
 
 
@@ -204,8 +204,8 @@ def _parts(load: Load | Axial) -> tuple[ca.SX, ...]:
 
 def infinite(made: Prepared) -> Iterator[str]:
     """Yield messages about forces that are not finite at the start, with zero inputs."""
-    for force in made.eq.forces:
-        (found,) = made.numbers(ca.veccat(*(_parts(x)[0] for x in force.loads(made.eq.kin))))
+    for force, loads in zip(made.eq.forces, made.eq.loads, strict=True):
+        (found,) = made.numbers(ca.veccat(*(_parts(x)[0] for x in loads)))
         if not np.isfinite(found).all():
             yield (
                 f"force '{force.name}': expected a finite force at the start, got "

@@ -220,7 +220,7 @@ def _project(
     reaction = [force_C, about_C]
     if link.reverse:
         reaction = [-force_P, -about_P - ca.cross(p, force_P)]
-    R = link.joint.pose(q)[0]
+    R = link.joint.pose(q)[0] if link.reverse else R_PC
     for load in axial:
         rows[load.joint.directions[load.direction]] -= load.value
         along = ca.sparsify(R.T @ link.joint.axis(load.direction, R))

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import accumulate, chain, pairwise
 from typing import final
 
@@ -20,7 +21,7 @@ from symfric.multibody.dynamics import (
     loop_of,
     normalisations,
 )
-from symfric.multibody.forces import Force, Gravity
+from symfric.multibody.forces import Axial, Force, Gravity, Load
 from symfric.multibody.kinematics import Cuts, Kinematics, Turn, kinematics
 from symfric.multibody.spatial import vector
 from symfric.multibody.topology import Topology
@@ -33,6 +34,7 @@ class Equations:
 
     Attributes:
         forces: applied forces.
+        loads: loads of each of `forces` on the bodies.
         held: constraints other than joints.
         turns: angles of joints in loops that forces depend on.
         norms: number of norm constraints of Euler parameters; these are the last constraints.
@@ -43,8 +45,6 @@ class Equations:
         balance: M a + Phi_q' lam - Q, shape (n, 1), affine in a, lam and F.
         contacts: contacts of all joints and elements with friction.
         normals: normal force of each contact [N], in terms of q, qd, a, lam.
-        kinetic, potential: energies [J].
-        power: power of all applied forces, of friction and of drives on the bodies [W].
         reactions: wrench on the child of each joint at its joint point, in the child's joint frame.
         pressing: wrench that loads each bearing: the reaction; for a joint that only closes loops,
             the reaction in the parent's joint frame.
@@ -52,6 +52,7 @@ class Equations:
 
     kin: Kinematics
     forces: tuple[Force, ...]
+    loads: tuple[tuple[Load | Axial, ...], ...]
     loops: tuple[Loop, ...]
     held: tuple[Held, ...]
     turns: tuple[Turn, ...]
@@ -67,9 +68,6 @@ class Equations:
     balance: ca.SX
     contacts: tuple[Contact, ...]
     normals: tuple[ca.SX, ...]
-    kinetic: ca.SX
-    potential: ca.SX
-    power: ca.SX
     reactions: dict[str, Wrench]
     pressing: dict[str, Wrench]
 
@@ -93,10 +91,27 @@ class Equations:
         """Partial derivative of the constraints with respect to time, shape (m, 1)."""
         return ca.jacobian(self.phi, self.kin.t)
 
-    @property
+    @cached_property
     def mass(self) -> ca.SX:
         """Mass matrix M, shape (n, n)."""
         return ca.jacobian(self.balance, self.a)
+
+    @property
+    def kinetic(self) -> ca.SX:
+        """Kinetic energy of all bodies [J]."""
+        return kinetic_energy(self.kin)
+
+    @property
+    def potential(self) -> ca.SX:
+        """Potential energy of all forces [J]."""
+        return sum((force.energy(self.kin) for force in self.forces), ca.SX(0))
+
+    @property
+    def power(self) -> ca.SX:
+        """Power of all applied forces, of friction and of drives on the bodies [W]."""
+        loads = [*chain(*self.loads), *(x for c in self.contacts for x in c.loads(self.kin))]
+        total = sum((load.power(self.kin) for load in loads), ca.SX(0))
+        return total + ca.dot(self.lam, self.phi_t)
 
     @property
     def angles(self) -> ca.SX:
@@ -158,11 +173,10 @@ def equations(
     rubbing = (c.contacts(kin, x) for c, (_, x) in zip(constraints, of_held, strict=True))
     elements = (f.contact(kin) for f in forces if isinstance(f, ActuatedElement))
     contacts = (*joint_contacts(kin), *chain(*rubbing), *elements)
-    loads = [load for f in forces if not isinstance(f, Gravity) for load in f.loads(kin)]
+    applied = tuple(tuple(f.loads(kin)) for f in forces)
+    weighed = [isinstance(f, Gravity) for f in forces]  # the ground is accelerated by -g instead
+    loads = [x for own, weight in zip(applied, weighed, strict=True) if not weight for x in own]
     loads += [load for c in contacts for load in c.loads(kin)]
-    weights = [load for f in gravity for load in f.loads(kin)]
-    power = sum((load.power(kin) for load in (*loads, *weights)), ca.SX(0))
-    power += ca.dot(every, ca.jacobian(phi, t))
     in_parent = [loop.reaction(x) for loop, x in zip(loops, own, strict=False)]
     loads += [load for part, x in of_held for load in part.loads(x)]
     of_loops = list(zip(loops, in_parent, strict=True))
@@ -181,11 +195,10 @@ def equations(
     phi_dot = ca.jtimes(phi, q, qd) + ca.jacobian(phi, t)
     phi_ddot = ca.jtimes(phi, q, a) + ca.jtimes(phi_dot, q, qd) + ca.jacobian(phi_dot, t)
     normals = tuple(c.normal(kin, pressing) for c in contacts)
-    potential = sum((f.energy(kin) for f in forces), ca.SX(0))
     return Equations(
-        kin, tuple(forces), loops, held, tuple(turns.values()), norms.numel(), q, qd, a, lam,
-        stacked(c.F for c in contacts), ca.densify(phi), phi_dot, phi_ddot, ca.densify(rows),
-        contacts, normals, kinetic_energy(kin), potential, power, reactions, pressing,
+        kin, tuple(forces), applied, loops, held, tuple(turns.values()), norms.numel(), q, qd, a,
+        lam, stacked(c.F for c in contacts), ca.densify(phi), phi_dot, phi_ddot, ca.densify(rows),
+        contacts, normals, reactions, pressing,
     )  # fmt: skip
 
 

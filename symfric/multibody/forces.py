@@ -43,8 +43,10 @@ class Load(NamedTuple):
 
     def moment_about(self, body: Body, motion: Motion) -> ca.SX:
         """Return the moment about the centre of mass of the body, in the body's components."""
-        com = motion.point(body.c)[0]
-        arm = motion.R.T @ (self.point - com) if self.arm is None else self.arm - body.c
+        if self.arm is None:
+            arm = motion.R.T @ (self.point - motion.place(body.c))
+        else:
+            arm = self.arm - body.c
         return motion.R.T @ self.moment + ca.cross(arm, motion.R.T @ self.force)
 
 
@@ -161,7 +163,7 @@ class Gravity(Force):
         """Yield the weight of every body at its centre of mass."""
         for name, body in kin.topology.bodies.items():
             if name != GROUND:
-                com, _ = kin.motion[name].point(body.c)
+                com = kin.motion[name].place(body.c)
                 yield Load(name, body.mass * vector(self.g), com, arm=body.c)
 
     def energy(self, kin: Kinematics) -> ca.SX:

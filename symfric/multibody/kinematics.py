@@ -7,6 +7,7 @@ from typing import NamedTuple, final
 import casadi as ca
 import numpy as np
 
+from symfric.foundation.numeric import nonzeros
 from symfric.foundation.parameters import Variable
 from symfric.foundation.variable import stacked
 from symfric.model.kinds import POSITION
@@ -27,24 +28,31 @@ class Cuts:
     articulated-body algorithm, but for all unknowns of an implicit step.
 
     Attributes:
-        symbols: l, shape (k, 1).
-        values: value of each entry of l, in terms of coordinates and preceding entries of l.
         links: number of the link to which each entry of l belongs.
     """
 
     def __init__(self) -> None:
-        self.symbols, self.values = ca.SX(0, 1), ca.SX(0, 1)
+        self._symbols, self._values = list[ca.SX](), list[ca.SX]()
         self.links: list[int] = []
+
+    @property
+    def symbols(self) -> ca.SX:
+        """The symbols l, shape (k, 1)."""
+        return stacked(self._symbols)
+
+    @property
+    def values(self) -> ca.SX:
+        """Value of each entry of l, in terms of coordinates and preceding entries of l."""
+        return stacked(self._values)
 
     def __call__(self, link: int, expression: ca.SX) -> ca.SX:
         """Return `expression` with entries other than numbers and symbols replaced by symbols."""
         cut = ca.SX(expression)
-        for k in range(cut.nnz()):
-            value = ca.SX(cut.nz[k])
+        for k, value in enumerate(nonzeros(cut)):
             if not (value.is_constant() or value.is_symbolic()):
                 symbol = ca.SX.sym(f"l_{len(self.links)}")
-                self.symbols = ca.vertcat(self.symbols, symbol)
-                self.values = ca.vertcat(self.values, value)
+                self._symbols.append(symbol)
+                self._values.append(value)
                 self.links.append(link)
                 cut.nz[k] = symbol
         return cut
@@ -53,11 +61,11 @@ class Cuts:
         """Return the indices of the entries of l on which `expression` depends, also indirectly."""
         found = np.zeros(len(self.links), dtype=bool)
         found[ca.jacobian_sparsity(expression, self.symbols).get_triplet()[1]] = True
-        own = ca.jacobian_sparsity(self.values, self.symbols)
-        rows, columns = (np.array(part, dtype=int) for part in own.get_triplet())
+        own = ca.jacobian_sparsity(self.values, self.symbols).T
+        first, columns = (np.array(part, dtype=int) for part in (own.colind(), own.row()))
         for k in range(found.size - 1, -1, -1):
             if found[k]:
-                found[columns[rows == k]] = True
+                found[columns[first[k] : first[k + 1]]] = True
         return [int(k) for k in np.flatnonzero(found)]
 
 
@@ -122,9 +130,13 @@ class Motion(NamedTuple):
         """Velocity of the origin in world components."""
         return self.R @ self.v_B
 
+    def place(self, offset: ca.SX) -> ca.SX:
+        """Return the position in the world of a point fixed to the body."""
+        return self.p + self.R @ offset
+
     def point(self, offset: ca.SX) -> tuple[ca.SX, ca.SX]:
         """Return the position and velocity in the world of a point fixed to the body."""
-        return self.p + self.R @ offset, self.R @ (self.v_B + ca.cross(self.w_B, offset))
+        return self.place(offset), self.R @ (self.v_B + ca.cross(self.w_B, offset))
 
 
 class Relative(NamedTuple):
@@ -274,12 +286,14 @@ def _carried(base: Motion, link: Link, q: ca.SX, qd: ca.SX, qdd: ca.SX) -> Motio
     R_BP = ca.sparsify(R_BC @ R_PC.T)
     R_BA = ca.sparsify(R_BP @ R_AP.T)
     arm = link.at_base.p + R_AP @ p
-    w_A, own_w, own_v = base.w_B, R_BC @ (H_w @ qd), R_BP @ (H_v @ qd)
-    w = R_BA @ w_A + own_w
-    dw = R_BA @ base.dw_B + ca.cross(R_BA @ w_A, own_w) + R_BC @ (H_w @ qdd + drift_w)
-    dv = R_BA @ (base.dv_B + ca.cross(base.dw_B, arm) + ca.cross(w_A, ca.cross(w_A, arm)))
-    dv += 2 * ca.cross(R_BA @ w_A, own_v) + R_BP @ (H_v @ qdd + drift_v)
-    dv = dv + ca.cross(dw, to_body) + ca.cross(w, ca.cross(w, to_body))
-    v = R_BA @ (base.v_B + ca.cross(w_A, arm)) + own_v + ca.cross(w, to_body)
+    own_w, own_v = R_BC @ (H_w @ qd), R_BP @ (H_v @ qd)
+    w_A, on_arm = R_BA @ base.w_B, ca.cross(base.w_B, arm)
+    w = w_A + own_w
+    on_body = ca.cross(w, to_body)
+    dw = R_BA @ base.dw_B + ca.cross(w_A, own_w) + R_BC @ (H_w @ qdd + drift_w)
+    dv = R_BA @ (base.dv_B + ca.cross(base.dw_B, arm) + ca.cross(base.w_B, on_arm))
+    dv += 2 * ca.cross(w_A, own_v) + R_BP @ (H_v @ qdd + drift_v)
+    dv = dv + ca.cross(dw, to_body) + ca.cross(w, on_body)
+    v = R_BA @ (base.v_B + on_arm) + own_v + on_body
     R_WB = ca.sparsify(base.R @ R_BA.T)
     return Motion(R_WB, base.p + base.R @ arm + R_WB @ to_body, w, v, dw, dv)

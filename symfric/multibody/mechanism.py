@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Sequence
 from copy import copy
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import casadi as ca
@@ -30,7 +31,6 @@ from symfric.multibody.prepare import (
     project,
     written,
 )
-from symfric.multibody.results import sketch
 from symfric.multibody.slips import slips
 from symfric.multibody.spatial import GROUND, Body, Frame, Vector, is_vector
 from symfric.multibody.topology import Topology, spanning_tree
@@ -95,15 +95,29 @@ class Mechanism(packed.Portable, Showing):
         )
 
     def thumbnail(self) -> "Figure | None":
-        """Return a small figure of the mechanism at its start; None if it cannot be built yet."""
-        from symfric.results.animation import still  # noqa: PLC0415  (slow to import)
-
+        """Return the schematic; None if the mechanism cannot be built yet."""
         try:
-            made = self.prepare()
+            return self.schematic()
         except ValueError:
             return None
-        drawn = sketch(made.eq, {})
-        return still(drawn, made.numbers(drawn.places)[0])
+
+    def schematic(self, path: str | Path | None = None, p: Variables = ()) -> "Figure":
+        """Return a labelled figure of the mechanism at its start, 85 mm wide.
+
+        It has bodies, joints, springs and dampers with their names and parameters, coordinates
+        (blue) and inputs (green) with their positive directions, and contacts with friction with
+        their loads (orange).
+
+        Args:
+            path: output file; its suffix (.png, .svg, .pdf) selects the format.
+            p: parameters, as for `build`.
+
+        Raises:
+            ValueError: all mistakes at once, each with its path; or the suffix is unknown.
+        """
+        from symfric.results.schematic import schematic  # noqa: PLC0415  (slow to import)
+
+        return schematic(self.build(p), path)
 
     def to_pack(self) -> dict[str, Any]:
         """Return all added parts."""

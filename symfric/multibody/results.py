@@ -5,16 +5,16 @@ from dataclasses import replace
 
 import casadi as ca
 
-from symfric.foundation.numeric import equals
+from symfric.foundation.numeric import Scalar, equals, is_number
 from symfric.foundation.variable import stacked, strays
 from symfric.model import Output
 from symfric.model.kinds import WORK
-from symfric.model.parts import Mark, Part, Sketch, Symbol
+from symfric.model.parts import Arrow, Mark, Part, Sketch, Symbol
 from symfric.multibody.contact import LeverContact
 from symfric.multibody.equations import Equations
-from symfric.multibody.forces import SpringDamper
+from symfric.multibody.forces import JointSpringDamper, SpringDamper
 from symfric.multibody.joint import COMPONENTS, FORCE_NAMES
-from symfric.multibody.joints import Distance
+from symfric.multibody.joints import Distance, Universal
 from symfric.multibody.kinematics import Motion
 from symfric.multibody.spatial import GROUND
 from symfric.multibody.topology import body_of
@@ -138,7 +138,10 @@ def constraint_units(units: list[str]) -> tuple[str, str, str]:
     return (unit, f"{unit}/s", f"{unit}/s^2") if unit else ("", "", "")
 
 
-SPRING, DAMPER = (Symbol(line=line, anchored=True) for line in ("spring", "damper"))
+SPRING, DAMPER, STRUT = (Symbol(line=line, anchored=True) for line in ("spring", "damper", "strut"))
+SPIRAL, LINK = Symbol(line="spiral"), Symbol(line="link")
+FORWARD = {"slide": (0.0, 0.0, 1.0), "x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0)}
+"""Directions of joints in the axes of a frame, if they are not about z."""
 
 
 def sketch(eq: Equations, scales: Mapping[str, float]) -> Sketch:
@@ -162,25 +165,90 @@ def sketch(eq: Equations, scales: Mapping[str, float]) -> Sketch:
         own = [(place, k) for place, k in used.items() if body_of(place) == name]
         corners = tuple(k for place, k in own if place in held or place not in pulled)
         far = tuple(k for place, k in own if place not in held and place in pulled)
-        parts.append(Part(name, len(columns), corners, far, fixed=name == GROUND))
+        mass = _amount(bodies[name].mass, "kg")
+        parts.append(Part(name, len(columns), corners, far, name == GROUND, mass))
         columns.append(_column(motion, ca.SX.eye(3), bodies[name].c))
     marks: list[Mark] = []
     for joint in joints:
         slips = ((c.name, scales[c.name]) for c in eq.contacts
                  if c.part == joint.name and c.name in scales)  # fmt: skip
         slips = tuple((f"{name}_slip", scale) for name, scale in slips)
-        marks.append(_mark(joint.name, joint.symbol, (joint.parent, joint.child), used, slips))
+        mark = _mark(joint.name, joint.symbol, (joint.parent, joint.child), used, slips)
+        rubs = tuple(c.name for c in eq.contacts if c.part == joint.name)
+        label = joint.name if joint.symbol.line else ""
+        marks.append(replace(mark, contacts=rubs, label=label))
     for force in springs:
-        symbol = DAMPER if equals(force.stiffness, 0.0) else SPRING
-        marks.append(_mark(force.name, symbol, (force.a, force.b), used))
-    return Sketch(ca.horzcat(*columns), tuple(parts), tuple(marks))
+        mark = _mark(force.name, _springy(force), (force.a, force.b), used)
+        label = _amounts(force, "N/m", "N s/m") or force.name
+        marks.append(replace(mark, label=label))
+    marks += _on_joints(eq, used)
+    return Sketch(ca.horzcat(*columns), tuple(parts), tuple(marks), arrows=tuple(_arrows(eq, used)))
+
+
+def _on_joints(eq: Equations, used: Mapping[str, int]) -> Iterator[Mark]:
+    """Yield springs and dampers of joints, and elements with friction such as belts and gears."""
+    for force in eq.forces:
+        if isinstance(force, JointSpringDamper):
+            joint, direction = force.place(eq.kin)
+            slides = joint.linear(direction)
+            units = ("N/m", "N s/m") if slides else ("N m/rad", "N m s/rad")
+            if label := _amounts(force, *units):
+                turned = Symbol() if equals(force.stiffness, 0.0) else SPIRAL
+                ends = joint.parent, joint.child
+                mark = _mark(force.name, _springy(force) if slides else turned, ends, used)
+                yield replace(mark, label=label)
+    for contact in eq.contacts:
+        if isinstance(contact, LeverContact):
+            at = [used[end.joint.child] for end in contact.ends]
+            symbol = LINK if at[0] != at[-1] else Symbol()
+            yield Mark(contact.part, symbol, at[0], at[-1], contacts=(contact.name,))
+
+
+def _springy(force: SpringDamper | JointSpringDamper) -> Symbol:
+    if equals(force.damping, 0.0):
+        return SPRING
+    return DAMPER if equals(force.stiffness, 0.0) else STRUT
+
+
+def _amounts(force: SpringDamper | JointSpringDamper, stiffness: str, damping: str) -> str:
+    """Return the symbols or values of stiffness and damping, given their units."""
+    found = _amount(force.stiffness, stiffness), _amount(force.damping, damping)
+    return ", ".join(filter(None, found))
+
+
+def _arrows(eq: Equations, used: Mapping[str, int]) -> Iterator[Arrow]:
+    """Yield the positive directions of the coordinates of joints, and of inputs that act on them.
+
+    Joints without directions, such as balls, have no arrows.
+    """
+    pushes = [f for f in eq.forces if isinstance(f, JointSpringDamper)]
+    for link in eq.kin.topology.links:
+        joint = link.joint
+        a, b = used[joint.parent], used[joint.child]
+        for direction, k in joint.directions.items():
+            frame = b if isinstance(joint, Universal) and direction == "y" else a
+            turning = not joint.linear(direction)
+            axis = FORWARD.get(direction, (0.0, 0.0, 1.0))
+            name = joint.coordinate(k)
+            yield Arrow((name, f"{name}_rate"), b, frame, axis, turning)
+            for push in pushes:
+                drive = ca.SX(push.actuator)
+                if drive.is_symbolic() and push.place(eq.kin) == (joint, direction):
+                    yield Arrow((str(drive),), b, frame, axis, turning)
+
+
+def _amount(value: Scalar, unit: str) -> str:
+    """Return the name of a symbol, a number with its unit, or nothing for an expression or zero."""
+    if is_number(value):
+        return f"{float(value):.3g} {unit}" if float(value) else ""
+    return str(value) if ca.SX(value).is_symbolic() else ""
 
 
 def _mark(
     name: str,
     symbol: Symbol,
     ends: tuple[str, str],
-    used: dict[str, int],
+    used: Mapping[str, int],
     slips: tuple[tuple[str, float], ...] = (),
 ) -> Mark:
     """Return a mark; if possible, its first end is the end that is on the ground."""

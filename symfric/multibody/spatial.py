@@ -10,6 +10,7 @@ Source: Nikravesh, Computer-Aided Analysis of Mechanical Systems, 1988, chapter 
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from math import isfinite
 from typing import Any, final
 
@@ -18,7 +19,7 @@ import numpy as np
 
 from symfric.foundation.checks import shown
 from symfric.foundation.numeric import Array, Scalar, is_number, is_symbolic
-from symfric.foundation.variable import Variable, at_start
+from symfric.foundation.variable import Variable, at_start, stacked
 
 Vector = Sequence[Any] | ca.SX | ca.DM
 """Three numbers or symbols."""
@@ -26,7 +27,8 @@ Vector = Sequence[Any] | ca.SX | ca.DM
 
 def vector(values: Vector) -> ca.SX:
     """Return `values` as a column (3, 1)."""
-    return ca.SX(ca.vertcat(*(values[i] for i in range(3))))
+    rows: list[Any] = [values[i] for i in range(3)]
+    return ca.SX(rows) if all(type(row) is float for row in rows) else stacked(rows)
 
 
 def is_vector(values: Any) -> bool:
@@ -174,7 +176,7 @@ class Body:
     frames: dict[str, Frame] = field(default_factory=lambda: {"": Frame()})
     ideal: bool = False
 
-    @property
+    @cached_property
     def J(self) -> ca.SX:
         """Inertia about the centre of mass [kg m^2], shape (3, 3)."""
         J = ca.diag(ca.SX(ca.vertcat(*self.inertia[:3])))
@@ -183,7 +185,7 @@ class Body:
                 J[i, j] = J[j, i] = value
         return ca.sparsify(J)
 
-    @property
+    @cached_property
     def c(self) -> ca.SX:
         """Position of the centre of mass relative to the origin [m], shape (3, 1)."""
         return vector(self.com)

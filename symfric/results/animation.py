@@ -1,38 +1,38 @@
-"""Animations and still figures of mechanisms."""
+"""Animations of mechanisms."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
-from string import Template
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
-from matplotlib.animation import FFMpegWriter, PillowWriter
+from matplotlib.animation import FFMpegWriter
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from symfric.foundation import checks
-from symfric.foundation.files import write_text, written
+from symfric.foundation.files import written
 from symfric.foundation.numeric import Array
 from symfric.foundation.panels import blank, grid
-from symfric.foundation.shown import data_uri
 from symfric.foundation.style import EDGE, colour
 from symfric.foundation.units import readable
 from symfric.foundation.variable import stacked
 from symfric.model.parts import Sketch
+from symfric.results.films import pictures, write_gif, write_page
 from symfric.results.kinds import friction_laws
 from symfric.results.signals import Signals
 from symfric.results.strokes import AZIMUTH, ELEVATION, Poses, Stroke, View, look, strokes
 
+Frame = TypeVar("Frame")
 ENDINGS = (".gif", ".html", ".mp4")
 Flags = NDArray[np.bool_]
 BRIEF, LONG, SHOWN = 2.0, 12.0, 6.0
 """Motions between BRIEF and LONG [s] are shown in real time, other motions in SHOWN [s]."""
 INSIDE = np.array([[0.01, 0.01], [0.99, 0.94]])
 """Corners of the part of a figure that contains spatial axes and their labels."""
-SIZE, SMALL = 6.4, 3.2
-"""Larger side of the panel of an animation and of a small figure [inch]."""
+SIZE = 6.4
+"""Larger side of the panel of an animation [inch]."""
 PATH = 1001
 """Number of points in the path of a centre of mass."""
 STICKS, SLIDES = colour(1), "white"
@@ -48,7 +48,7 @@ def animate(
     trajectory: Signals,
     path: str | Path,
     *,
-    fps: float = 20.0,
+    fps: float = 12.5,
     speed: float | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> None:
@@ -65,31 +65,23 @@ def animate(
     times, speed = frame_times(float(trajectory.t[0]), float(trajectory.t[-1]), fps, speed)
     figure, pose = picture(trajectory, times, speed)
 
-    def frames() -> Iterator[None]:
-        for k in range(times.size):
-            pose(k)
+    def told(frames: Iterable[Frame]) -> Iterator[Frame]:
+        for k, frame in enumerate(frames, start=1):
             if progress is not None:
-                progress((k + 1) / times.size)
-            yield
+                progress(k / times.size)
+            yield frame
 
-    if Path(path).suffix.lower() == ".html":
-        sources = ",\n".join(f'"{data_uri(figure, dpi=100)}"' for _ in frames())
-        player = Template(Path(__file__).with_name("player.html").read_text("utf-8"))
-        settings = {"pictures": sources, "last": times.size - 1, "wait": round(1000 / fps)}
-        write_text(path, player.substitute(settings))
+    ending = Path(path).suffix.lower()
+    if ending == ".mp4":
+        movie = FFMpegWriter(fps)  # type: ignore[arg-type]
+        with written(path) as temporary, movie.saving(figure, str(temporary), dpi=100):
+            for k in told(range(times.size)):
+                pose(k)
+                movie.grab_frame()
         return
-    with written(path) as temporary:
-        if Path(path).suffix.lower() == ".mp4":
-            movie = FFMpegWriter(fps)  # type: ignore[arg-type]
-            with movie.saving(figure, str(temporary), dpi=100):
-                for _ in frames():
-                    movie.grab_frame()
-        else:  # `saving` would write the film even after an interrupt
-            film = PillowWriter(fps)  # type: ignore[arg-type]
-            film.setup(figure, str(temporary), dpi=100)
-            for _ in frames():
-                film.grab_frame()
-            film.finish()
+    film = list(told(pictures(figure, pose, times.size)))
+    write = write_page if ending == ".html" else write_gif
+    write(path, film, fps)
 
 
 def check_format(path: str | Path) -> None:
@@ -127,10 +119,10 @@ def picture(
         ValueError: the model has no bodies.
     """
     model = trajectory.model
-    if model.sketch is None:
+    if model.sketch is None or model.sketch().still:
         raise ValueError(
             f"animation of '{trajectory.scene}': expected a machine with places, got a model "
-            "without a sketch; plot() shows its signals"
+            "without a sketch that moves; plot() shows its signals"
         )
     sketch = model.sketch()
     columns = trajectory.of(sketch.places, times).reshape(-1, 12, times.size)
@@ -164,18 +156,8 @@ def picture(
     return figure, show
 
 
-def still(sketch: Sketch, places: Array) -> Figure:
-    """Return a small figure of a sketch, given its places, shape (12, k)."""
-    columns = places.T[:, :, None]
-    centres = columns[[part.centre for part in sketch.parts], 9:]
-    figure, drawn = _drawn(sketch, columns, centres, {}, SMALL)
-    for put in drawn:
-        put(0)
-    return figure
-
-
 def _drawn(
-    sketch: Sketch, columns: Array, paths: Array, sticks: Mapping[str, Flags], size: float = SIZE
+    sketch: Sketch, columns: Array, paths: Array, sticks: Mapping[str, Flags]
 ) -> tuple[Figure, list[Callable[[int], None]]]:
     """Return a figure, and a function of k for each stroke that draws it as in picture k.
 
@@ -184,11 +166,10 @@ def _drawn(
         columns: axes and positions of the places in each picture, shape (places, 12, pictures).
         paths: centres of the parts, shape (parts, 3, times).
         sticks: flags by joint, True in pictures where its contacts stick.
-        size: larger side of the panel [inch].
     """
     poses = Poses(columns[:, :9].reshape(-1, 3, 3, columns.shape[2]), columns[:, 9:], paths)
     view = look(sketch, poses)
-    figure, axes = _flat(view, size) if view.planar else _spatial(view, size)
+    figure, axes = _flat(view) if view.planar else _spatial(view)
     return figure, [_added(figure, axes, s) for s in strokes(sketch, poses, view, sticks)]
 
 
@@ -206,7 +187,7 @@ def _sticks(trajectory: Signals, sketch: Sketch, times: Array) -> dict[str, Flag
     }
 
 
-def _flat(view: View, size: float) -> tuple[Figure, Array]:
+def _flat(view: View) -> tuple[Figure, Array]:
     """Return a figure that shows a plane along its normal, and the projection to its axes."""
     axes = np.stack([view.right, view.up])
     low, high = axes @ view.low, axes @ view.high
@@ -217,7 +198,7 @@ def _flat(view: View, size: float) -> tuple[Figure, Array]:
     width, height = high - low
     factor, unit = readable("m", [low, high])
     low, high = factor * low, factor * high
-    scale = size / max(width, height)
+    scale = SIZE / max(width, height)
     figure, ((ax,),) = grid(1, 1, scale * width + 0.9, scale * height + 0.9)
     ax.set_aspect("equal")
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
@@ -225,9 +206,9 @@ def _flat(view: View, size: float) -> tuple[Figure, Array]:
     return figure, factor * axes
 
 
-def _spatial(view: View, size: float) -> tuple[Figure, Array]:
+def _spatial(view: View) -> tuple[Figure, Array]:
     """Return a figure with three axes of equal scale, and the projection to its axes."""
-    figure = blank(1.125 * size, size, free=True)
+    figure = blank(1.125 * SIZE, SIZE, free=True)
     ax: Any = figure.add_subplot(projection="3d", proj_type="ortho")
     extent = view.high - view.low
     extent = np.maximum(extent, 0.15 * extent.max())
@@ -260,7 +241,7 @@ def _added(figure: Figure, axes: Array, stroke: Stroke) -> Callable[[int], None]
     """Add a stroke to the figure, and return a function of k that draws it as in picture k."""
     points = np.einsum("ac,nck->kan", axes, stroke.points)
     canvas: Any = figure.axes[0]
-    (line,) = canvas.plot(*([] for _ in axes), **_style(stroke))
+    (line,) = canvas.plot(*([] for _ in axes), **style(stroke))
     place = line.set_data if len(axes) == 2 else line.set_data_3d
 
     def put(k: int) -> None:
@@ -279,7 +260,7 @@ def _direction(axis: Array) -> str:
     return "({:.2g}, {:.2g}, {:.2g})".format(*(axis.round(9) + 0.0))
 
 
-def _style(stroke: Stroke) -> dict[str, Any]:
+def style(stroke: Stroke) -> dict[str, Any]:
     """Return the style keywords of a stroke."""
     shade = colour(stroke.body) if stroke.body >= 0 else EDGE
     styles: dict[str, dict[str, Any]] = {
@@ -293,7 +274,8 @@ def _style(stroke: Stroke) -> dict[str, Any]:
         "ground": {"color": GROUND, "linewidth": 3.0, "alpha": 0.6},
         "anchor": {"color": GROUND, "marker": "^", "markersize": 13.0, "linestyle": ""},
         "rod": {"color": EDGE, "linewidth": 1.8},
-        "damper": {"color": EDGE, "linewidth": 1.2, "linestyle": "--"},
+        "damper": {"color": EDGE, "linewidth": 1.2},
+        "link": {"color": EDGE, "linewidth": 1.4, "linestyle": "--"},
         "spring": {"color": "#7f7f7f", "linewidth": 1.0},
         "joint": {"color": EDGE, "marker": stroke.marker, "linestyle": "", "markeredgewidth": 1.6,
                   "markersize": 4.0 if stroke.sticks is None else 9.0,

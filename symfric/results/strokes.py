@@ -38,8 +38,8 @@ class Stroke(NamedTuple):
     """Line or markers in all pictures.
 
     Attributes:
-        role: body, arm (to the end of a spring), path, block, axis, guide, rod, spring, damper,
-            ground (a guide fixed to the ground), anchor, centre, or joint.
+        role: body, arm (to the end of a spring), path, block, axis, guide, rod, link, spring,
+            damper, ground (a guide fixed to the ground), anchor, centre, or joint.
         points: points of the line, shape (n, 3, pictures); NaN interrupts the line.
         body: number of the body, which selects the colour; -1 if the stroke belongs to no body.
         marker: marker of a joint.
@@ -119,6 +119,8 @@ def _normal(sketch: Sketch, poses: Poses) -> Array | None:
         aside = _aside(directions[:, 0] if extent[0] > 0 else np.array([1.0, 0.0, 0.0]))
         normal = directions[:, 2] if extent[1] > FLAT * extent[0] else aside
     across = [np.linalg.norm(np.cross(axis.T, normal), axis=1).max() for axis in hinges]
+    slides = [poses.axes[m.a, 2] for m in sketch.marks if m.symbol.guide or m.symbol.slot]
+    across += [float(np.abs(normal @ axis).max()) for axis in slides]
     beyond = np.abs(normal @ moved).max() > FLAT * max(extent[0], 1e-300)
     if beyond or max(across, default=0.0) > FLAT:
         return None
@@ -183,10 +185,32 @@ def _behind(mark: Mark, poses: Poses, view: View) -> Iterator[Stroke]:
         role = "ground" if mark.grounded else "guide"
         yield Stroke(role, np.stack([a + low * z, a + high * z]))
     if mark.symbol.line:
-        points = _zigzag(a, b, view) if mark.symbol.line == "spring" else np.stack([a, b])
-        yield Stroke(mark.symbol.line, points)
+        yield from _line(mark.symbol.line, a, b, view)
     if mark.grounded and mark.symbol.anchored:
         yield Stroke("anchor", a[None])
+
+
+def _line(line: str, a: Array, b: Array, view: View) -> Iterator[Stroke]:
+    """Yield the line of an element between two points; see `Symbol`."""
+    aside = 1.4 * view.size * _aside_of(b - a, view) if line == "strut" else np.zeros_like(a)
+    if line in ("spring", "strut"):
+        yield Stroke("spring", _zigzag(a + aside, b + aside, view))
+    if line in ("damper", "strut"):
+        yield Stroke("damper", _dashpot(a - aside, b - aside, view))
+    if line == "strut":
+        bars = [a + aside, a - aside, np.full_like(a, np.nan), b + aside, b - aside]
+        yield Stroke("damper", np.stack(bars))
+    if line == "circle":
+        angles = np.linspace(0.0, 2 * np.pi, 73)[:, None, None]
+        yield Stroke("rod", a + np.cos(angles) * (b - a) + np.sin(angles) * np.cross(
+            (b - a).T, view.eye).T)  # fmt: skip
+    if line == "spiral":
+        angles = np.linspace(0.0, 5 * np.pi, 91)[:, None]
+        turn = np.cos(angles) * view.right + np.sin(angles) * view.up
+        growing = np.linspace(0.5, 2.6, 91)[:, None] * view.size * turn
+        yield Stroke("spring", b + growing[:, :, None])
+    if line in ("rod", "link"):
+        yield Stroke(line, np.stack([a, b]))
 
 
 def _symbol(mark: Mark, poses: Poses, view: View) -> Iterator[Stroke]:
@@ -213,12 +237,25 @@ def _block(axes: Array, at: Array, size: float) -> Array:
     return np.stack([point for i, j in EDGES for point in (corners[i], corners[j], gap)])
 
 
-def _zigzag(a: Array, b: Array, view: View) -> Array:
-    """Return the points of a spring of 8 coils between two points, facing the viewer."""
-    d = b - a
+def _aside_of(d: Array, view: View) -> Array:
+    """Return the unit vectors across directions `d`, facing the viewer, shape (3, pictures)."""
     side = np.cross(d.T, view.eye)
     length = np.linalg.norm(side, axis=1, keepdims=True)
     side = np.where(length > 1e-6 * np.linalg.norm(d), side / np.maximum(length, 1e-300), view.up)
+    return np.asarray(side.T)
+
+
+def _zigzag(a: Array, b: Array, view: View) -> Array:
+    """Return the points of a spring of 8 coils between two points, facing the viewer."""
     s = np.concatenate([[0.0, 0.1], np.linspace(0.125, 0.875, 16), [0.9, 1.0]])
     swing = np.concatenate([[0.0, 0.0], np.tile([1.0, -1.0], 8), [0.0, 0.0]]) * view.size
-    return a + s[:, None, None] * d + swing[:, None, None] * side.T
+    d = b - a
+    return a + s[:, None, None] * d + swing[:, None, None] * _aside_of(d, view)
+
+
+def _dashpot(a: Array, b: Array, view: View) -> Array:
+    """Return the points of a damper between two points: a cup, and a piston in it."""
+    along = [0, 0.4, 0.4, 0.65, np.nan, 0.4, 0.4, 0.65, np.nan, 1, 0.55, np.nan, 0.55, 0.55]
+    across = [0, 0, 1, 1, np.nan, 0, -1, -1, np.nan, 0, 0, np.nan, 0.7, -0.7]
+    s, swing = np.array(along)[:, None, None], np.array(across)[:, None, None] * view.size
+    return a + s * (b - a) + swing * _aside_of(b - a, view)

@@ -259,7 +259,7 @@ class Trajectory(packed.Portable, Signals):
         self,
         path: str | Path,
         *,
-        fps: float = 20.0,
+        fps: float = 12.5,
         speed: float | None = None,
         progress: Callable[[float], None] | None = None,
     ) -> None:

@@ -1,9 +1,9 @@
 """Base class of scenes, which are parametric machines with a friction law, and their contacts."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, fields
-from math import isfinite
+from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING, Any, ClassVar, Self, final
 
@@ -26,102 +26,10 @@ from symfric.laws import Law
 from symfric.laws.base.law import require_law
 from symfric.model import Contact, Model, Output, Variables
 from symfric.model.contact import APPLIED
-from symfric.model.parts import Mark, Part, Sketch, Symbol
 from symfric.scenes.presets import Preset, presets_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-
-ALONG = {"x": ca.DM([0, 1, 0, 0, 0, 1, 1, 0, 0]), "z": ca.DM([1, 0, 0, 0, 1, 0, 0, 0, 1])}
-"""Axes of a place, column by column, by direction of its rail, which is along the third axis."""
-RAIL = Symbol("s", guide=True)
-TICK, HUB = Symbol("|"), Symbol("o")
-LINES = {line: Symbol(line=line, anchored=True) for line in ("spring", "damper")}
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class Block:
-    """Body on a rail in a drawing.
-
-    Attributes:
-        x, z: position [m], expressions of the model.
-        along: direction of the rail, "x" or "z"; empty for no rail.
-        slip: name of the signal of the sliding velocity; empty for no friction.
-        law: friction law; a slip below its velocity scale counts as sticking.
-    """
-
-    x: Scalar
-    z: Scalar
-    along: str = ""
-    slip: str = ""
-    law: Law | None = None
-
-
-def drawn(
-    blocks: Mapping[str, Block],
-    fixed: Mapping[str, tuple[Scalar, Scalar]] | None = None,
-    links: Sequence[tuple[str, str, str]] = (),
-    hands: Mapping[str, tuple[Scalar, float]] | None = None,
-    ticks: Sequence[tuple[Scalar, Scalar]] = (),
-    hub: Block | None = None,
-) -> Sketch:
-    """Return the drawing of a machine that is not a mechanism.
-
-    Args:
-        blocks: bodies by name.
-        fixed: places (x, z) [m], by name, on the ground or on a moving ground such as a road.
-        links: (line, from, to) between blocks and fixed places; a line is "spring" or "damper".
-        hands: angle [rad] and length [m], by name, of hands that rotate about the origin.
-        ticks: places (x, z) [m] of marks on a moving ground such as a belt.
-        hub: centre of the hands if it has friction.
-    """
-    columns: list[ca.SX] = []
-    parts: list[Part] = []
-    marks: list[Mark] = []
-    at: dict[str, int] = {}
-
-    def place(x: Scalar, z: Scalar, along: str = "x") -> int:
-        columns.append(ca.densify(ca.vertcat(ca.SX(ALONG[along]), x, 0, z)))
-        return len(columns) - 1
-
-    for name, (x, z) in (fixed or {}).items():
-        at[name] = place(x, z)
-    for name, block in blocks.items():
-        at[name] = place(block.x, block.z, block.along or "x")
-        parts.append(Part(name, at[name], (at[name],)))
-        if block.along:
-            start = place(*((0, block.z) if block.along == "x" else (block.x, 0)), block.along)
-            marks.append(Mark(name, RAIL, start, at[name], _slips(block), grounded=True))
-    for line, a, b in links:
-        marks.append(Mark(f"{a}_{b}", LINES[line], at[a], at[b], (), grounded=a in (fixed or {})))
-    for name, (angle, length) in (hands or {}).items():
-        centre = place(0, 0)
-        tip = place(length * ca.sin(angle), length * ca.cos(angle))
-        parts.append(Part(name, centre, (tip,)))
-    if hub is not None:
-        k = place(hub.x, hub.z)
-        marks.append(Mark("hub", HUB, k, k, _slips(hub)))
-    marks += [Mark("tick", TICK, k, k) for k in [place(x, z) for x, z in ticks]]
-    return Sketch(ca.horzcat(*columns), tuple(parts), tuple(marks), symbols=2.0)
-
-
-def around(way: Scalar, low: Scalar, high: Scalar) -> ca.SX:
-    """Return `way` [m] shifted into [low, high) by whole periods, as for a mark on a belt."""
-    length = high - low
-    return ca.SX(way - length * ca.floor((way - low) / length))
-
-
-def _slips(block: Block) -> tuple[tuple[str, float], ...]:
-    """Return the sliding velocity of a block and the velocity scale of its law, as in `Mark`."""
-    if not block.slip or block.law is None:
-        return ()
-    try:
-        scale = float(block.law.velocity_scale)
-    except (TypeError, RuntimeError, NotImplementedError):  # a free parameter of the model
-        return ()
-    return ((block.slip, scale),) if isfinite(scale) else ()
 
 
 @final
@@ -231,6 +139,24 @@ class Scene(Parametric, ABC):
                 f"{type(self).__name__}: expected one number or SX symbol for each parameter, got "
                 f"an array or MX for {', '.join(several)}; simulate_many(p=...) runs many values"
             )
+
+    def schematic(self, path: str | Path | None = None) -> "Figure":
+        """Return a labelled figure of the machine, 85 mm wide.
+
+        It has bodies, springs, dampers, the symbols of parameters, coordinates and velocities
+        (blue) and inputs (green) with their positive directions, and contacts with friction with
+        their loads (orange).
+
+        Args:
+            path: output file; its suffix (.png, .svg, .pdf) selects the format.
+
+        Raises:
+            ValueError: the model has no sketch, or the suffix is unknown.
+        """
+        from symfric.results.schematic import schematic  # noqa: PLC0415  (slow to import)
+
+        laws = parameters(self.law)
+        return schematic(self.model(n for n in parameters(self) if n not in laws), path)
 
     @abstractmethod
     def equations(self, p: Variables) -> Model:

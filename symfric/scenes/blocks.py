@@ -16,17 +16,8 @@ from symfric.model import Model, Output, Variables
 from symfric.model.kinds import FRICTION
 from symfric.model.parts import Sketch
 from symfric.scenes import fields
-from symfric.scenes.base import (
-    Block,
-    GivenInput,
-    Scene,
-    around,
-    contact,
-    drawn,
-    friction_outputs,
-    other_law,
-    structure,
-)
+from symfric.scenes.base import GivenInput, Scene, contact, friction_outputs, other_law, structure
+from symfric.scenes.drawing import Block, around, drawn
 
 
 def sine(t: ca.SX) -> ca.SX:
@@ -83,8 +74,13 @@ class Drive(Scene):
     def _sketch(self, x: ca.SX) -> Sketch:
         """Return the mass on its guide, or a rotating hand."""
         if self.turning:
-            return drawn({}, hands={"axis": (x, 1.0)})
-        return drawn({"mass": Block(x, 0.0, "x", "v", self.law)})
+            hub = Block(0.0, 0.0, "", "v", self.law, contact="guide")
+            arrows = [("x v", (0.0, 0.0), "turn y"), ("force", (0.0, 0.0), "turn y")]
+            return drawn({}, hands={"axis": (x, 1.0)}, hub=hub, arrows=arrows)
+        return drawn(
+            {"mass": Block(x, 0.0, "x", "v", self.law, "m", "guide")},
+            arrows=[("x v", "mass", "x"), ("force", "mass", "x")],
+        )
 
 
 def drive(
@@ -146,10 +142,11 @@ class Rabinowicz(Scene):
         way = 0.15 * self.m * self.g / self.k if not equals(self.k, 0.0) else 1.0
         marks = [(around(self.v_belt * t + i * way / 3, -way, 2 * way), 0.0) for i in range(9)]
         return drawn(
-            {"block": Block(x, 0.0, "x", "v_rel", self.law)},
+            {"block": Block(x, 0.0, "x", "v_rel", self.law, "m", "belt")},
             {"wall": (-way, 0.0)},
-            [("spring", "wall", "block")],
+            [("spring", "wall", "block", "k")],
             ticks=marks,
+            arrows=[("x v", "block", "x"), ("v_belt", (way, 0.0), "x")],
         )
 
 
@@ -240,11 +237,15 @@ class CoupledBlocks(Scene):
         marks = [(around(self.v_belt * t + i * way / 3, -way, 4 * way), 0.0) for i in range(15)]
         return drawn(
             {
-                "block_1": Block(x_1, 0.0, "x", "v_rel_1", self.law),
-                "block_2": Block(x_2 + 2 * way, 0.0, "x", "v_rel_2", self.law_of("block_2")),
+                "block_1": Block(x_1, 0.0, "x", "v_rel_1", self.law, "m_1", "block_1"),
+                "block_2": Block(
+                    x_2 + 2 * way, 0.0, "x", "v_rel_2", self.law_of("block_2"), "m_2", "block_2"
+                ),
             },
             {"wall_1": (-way, 0.5 * way), "wall_2": (way, 0.5 * way)},
-            [("spring", f"wall_{i}", f"block_{i}") for i in (1, 2)]
-            + [("spring", "block_1", "block_2")],
+            [("spring", f"wall_{i}", f"block_{i}", f"k_{i}") for i in (1, 2)]
+            + [("spring", "block_1", "block_2", "k_c")],
             ticks=marks,
+            arrows=[(f"x_{i} v_{i}", f"block_{i}", "x") for i in (1, 2)]
+            + [("v_belt", (3.5 * way, 0.0), "x")],
         )

@@ -22,7 +22,8 @@ from symfric.laws.static.machines import tilt
 from symfric.model import Model, Monitor, Output, Variables
 from symfric.model.parts import Sketch
 from symfric.scenes import fields
-from symfric.scenes.base import Block, GivenInput, Scene, contact, drawn, friction_outputs
+from symfric.scenes.base import GivenInput, Scene, contact, friction_outputs
+from symfric.scenes.drawing import Block, drawn
 
 
 def strokes(t: ca.SX) -> ca.SX:
@@ -89,7 +90,10 @@ class Prescribed(Scene):
             contacts=(slip,),
             outputs=friction_outputs(slip, "v")
             | ({"N": Output(N, "N", "normal force")} if varying else {}),
-            sketch=lambda: drawn({"sample": Block(x.symbol, 0.0, "x", "v", self.law)}),
+            sketch=lambda: drawn(
+                {"sample": Block(x.symbol, 0.0, "x", "v", self.law, contact="sample")},
+                arrows=[("x", "sample", "x"), ("v", "sample", "x")],
+            ),
         )
 
 
@@ -212,11 +216,12 @@ class QuarterCar(Scene):
         wheel, body = 0.5 * self.L_d, 1.5 * self.L_d
         return drawn(
             {
-                "wheel": Block(0.0, X_w + wheel),
-                "body": Block(0.0, X_b + body, "z", "v_b", self.law),
+                "wheel": Block(0.0, X_w + wheel, label="M_w"),
+                "body": Block(0.0, X_b + body, "z", "v_b", self.law, "M_b", "guide"),
             },
             {"road": (0.0, X_r)},
-            [("spring", "road", "wheel"), ("spring", "wheel", "body")],
+            [("strut", "road", "wheel", "k_t, b_t"), ("strut", "wheel", "body", "k_s, b_d")],
+            arrows=[("X_b v_b", "body", "z"), ("X_w v_w", "wheel", "z"), ("X_r", "road", "z")],
         )
 
     def normal_force(self, f_sd: Scalar, x_rel: Scalar) -> Scalar:

@@ -38,6 +38,8 @@ def test_every_law_has_a_page_with_formula_picture_and_parameters() -> None:
     for name in ALL_LAWS:
         assert f".. autoclass:: symfric.{ALL_LAWS[name].__name__}\n" in pages[name]
         assert f"/made/laws/{name}.png" in pages[name]
+        assert f":file: ../made/sliders/{name}.html" in pages[name]
+    assert all("it has no sliders" in pages[name] for name in POPULATIONS)
     assert all(f"`{p}`" in pages["lugre"] for p in parameters(LuGre()))
     assert r"$\sigma_{0}$" in pages["lugre"]
     families = {items.family(law) for law in items.every().values()}

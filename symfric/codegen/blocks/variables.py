@@ -91,6 +91,11 @@ def variable(
         Names in the order of `parameters`, and a sentence for each problem.
     """
     problems: list[str] = []
+    if "h" in parameters(obj):
+        problems.append(
+            "h: expected a parameter of another name, since h is the step size in generated code; "
+            "rename it, for example to h_0"
+        )
     if free is not None and fold is not None:
         problems.append(f"fold: expected none with free, which folds all others, got {fold!r}")
     if fold is False:

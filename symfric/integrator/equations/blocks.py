@@ -33,7 +33,7 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 
-from symfric.foundation.numeric import Array, bound, reciprocal
+from symfric.foundation.numeric import Array, bound, nonzeros, reciprocal
 from symfric.integrator.compiled.columns import filled
 from symfric.integrator.equations.manifold import PULLING, SHOCK
 from symfric.integrator.equations.matrices import Factors, SymbolicLU, factorise
@@ -82,10 +82,9 @@ def slopes(system: System) -> Slopes:
         place = {s.__hash__(): i for i, s in enumerate(ca.vertsplit(ca.vertcat(y, hidden)))}
         pivots = tuple(tuple(place[s.__hash__()] for s in ca.vertsplit(g)) for g in inner.groups)
     named = ca.SX(slope := ca.sparsify(slope))
-    places = [k for k in range(slope.nnz()) if not ca.SX(slope.nz[k]).is_constant()]
+    places = [k for k, entry in enumerate(nonzeros(slope)) if not entry.is_constant()]
     entries = ca.SX.sym("J", len(places))
-    for i, k in enumerate(places):
-        named.nz[k] = entries[i]
+    named.nz[places] = entries
     of_l = ca.Function("slopes", [hidden, y, d], [ca.vec(ca.SX(slope.nz[places]))])
     at = ca.Function("slopes", [y, d], [of_l(_inner(system), y, d)], {"cse": True})
     return Slopes(named, entries, system.in_steps(at), pivots)
@@ -329,7 +328,7 @@ def _parts(system: System) -> _Parts:
     symbols, values = own.entries[used], own.values(system.y, system.d)[used]
     return _Parts(
         _residual(system),
-        ca.Function("slopes_g", [system.y, system.d], [values], {"cse": True}),
+        ca.Function("slopes_g", [system.y, system.d], [values]),
         ca.Function("pack_g", [symbols], [lu.packed], {"cse": True}),
         ca.Function("solve_g", [lu.symbols, right], [s, change]),
         _sizes(system, W, symbols, moved, [place[i] for i in rows]),

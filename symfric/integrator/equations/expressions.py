@@ -111,22 +111,22 @@ def divided_once(expression: ca.SX) -> ca.SX:
     """Return `expression` with constant or repeated divisors inverted once."""
     arguments = ca.symvar(expression)
     function = ca.Function("f", arguments, [expression])
+    operations = list(map(function.instruction_id, range(function.n_instructions())))
+    if ca.OP_DIV not in operations:
+        return expression
     made, divisors = dict[int, int](), dict[int, int]()
-    for k in range(function.n_instructions()):
-        operation = function.instruction_id(k)
+    for k, operation in enumerate(operations):
         if operation == ca.OP_DIV:
             divisors[k] = made[function.instruction_input(k)[1]]
         if operation != ca.OP_OUTPUT:
             made[function.instruction_output(k)[0]] = k
-    if not divisors:
-        return expression
     often, inverse = Counter(divisors.values()), dict[int, ca.SX]()
 
     def rule(k: int, operands: list[ca.SX]) -> ca.SX | None:
         divisor = divisors.get(k)
         if divisor is None:
             return None
-        if often[divisor] == 1 and function.instruction_id(divisor) != ca.OP_CONST:
+        if often[divisor] == 1 and operations[divisor] != ca.OP_CONST:
             return None
         if divisor not in inverse:
             inverse[divisor] = reciprocal(operands[1])

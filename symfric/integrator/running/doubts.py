@@ -36,7 +36,7 @@ from numpy.typing import NDArray
 
 from symfric.foundation.numeric import Array
 from symfric.foundation.status import EnergyWarning, OverloadWarning
-from symfric.foundation.variable import strays, symbols_of
+from symfric.foundation.variable import stacked, strays, symbols_of
 from symfric.integrator.compiled.columns import Columns
 from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.running.integrator import Integrator, remember
@@ -95,7 +95,9 @@ def _determined(model: Model, write: Callable[[], list[Any]]) -> ca.SX | None:
     The law or the unknowns of the model may not determine them.
     """
     try:
-        found = by_laws(model, ca.vertcat(*write()))
+        found = ca.vertcat(*write())
+        if ca.depends_on(found, stacked(c.force for c in model.contacts)):
+            found = by_laws(model)(found)
     except (ValueError, TypeError, NotImplementedError):
         return None
     known = ca.vertcat(model.t, *(model.vector(letter) for letter in "xzup"))
@@ -105,19 +107,17 @@ def _determined(model: Model, write: Callable[[], list[Any]]) -> ca.SX | None:
 @final
 @dataclass(frozen=True, eq=False)
 class Sliding:
-    """Actual friction of one contact, and its friction in steady sliding.
+    """Friction of one contact in steady sliding.
 
     Attributes:
         contact: the contact.
         power: (v, N, p) -> power [W] dissipated by steady friction.
         needs: indices of the parameters on which the power depends.
-        rows: slip, friction and steady friction in the model.
     """
 
     contact: Contact
     power: ca.Function
     needs: list[int]
-    rows: ca.SX
     _checked: dict[Hashable, bool] = field(default_factory=dict[Hashable, bool])
 
     def suspect(self, p: Array) -> bool:
@@ -137,7 +137,15 @@ def _gains(
     """Yield a message about a contact whose friction adds energy to the motion."""
     (t, y), contact = run.seen, sliding.contact
     name, unit = f"sliding '{contact.name}'", contact.unit
-    slip, force, steady = _over_time(integrator, inputs, name, sliding.rows, t, y, p)
+
+    def slip_and_forces() -> list[Any]:
+        steady = _steady(contact, contact.slip, contact.N, contact.given)
+        return [contact.slip, contact.friction, steady]
+
+    rows = _determined(integrator.model, slip_and_forces)
+    if rows is None:
+        return
+    slip, force, steady = _over_time(integrator, inputs, name, rows, t, y, p)
     power, worst = force * slip, int(np.argmin(steady * slip))
     work, turnover = (np.diff(t) @ (w[1:] + w[:-1]) / 2 for w in (power, np.abs(power)))
     if steady[worst] * slip[worst] < 0 and work < -SHARE * turnover:
@@ -155,25 +163,23 @@ def sliding_places(model: Model) -> tuple[Sliding, ...]:
     return model.memory["sliding"]
 
 
+def _steady(contact: Contact, slip: ca.SX, load: ca.SX, given: Mapping[str, Any]) -> ca.SX:
+    """Return the force of a law in steady sliding."""
+    law = contact.law
+    return ca.SX(law.force(slip, load, law.steady_state_at(slip, load, **given), **given))
+
+
 def _sliding(model: Model, contact: Contact) -> Sliding | None:
-    """Return the friction of a contact; None if the unknowns of the model do not determine it."""
-    law, v, N, p = contact.law, ca.SX.sym("v"), ca.SX.sym("N"), model.vector("p")
-
-    def steady(slip: Any, load: Any, given: Mapping[str, Any]) -> ca.SX:
-        return ca.SX(law.force(slip, load, law.steady_state_at(slip, load, **given), **given))
-
-    def rows() -> list[Any]:
-        there = steady(contact.slip, contact.N, contact.given)
-        return [contact.slip, contact.friction, there]
-
-    found = _determined(model, rows)
-    if found is None:
+    """Return the steady friction of a contact; None if its law does not determine it."""
+    v, N, p = ca.SX.sym("v"), ca.SX.sym("N"), model.vector("p")
+    try:
+        power = _steady(contact, v, N, dict.fromkeys(contact.given, 0.0)) * v
+    except (ValueError, TypeError, NotImplementedError):
         return None
-    alone = steady(v, N, dict.fromkeys(contact.given, 0.0)) * v
-    if strays(alone, ca.vertcat(v, N, p)):
+    if strays(power, ca.vertcat(v, N, p)):
         return None
-    needs = [i for i in range(p.numel()) if ca.depends_on(alone, p[i])]
-    return Sliding(contact, ca.Function("power", [v, N, p], [alone]), needs, found)
+    needs = np.flatnonzero(ca.which_depends(power, p, 1, False)).tolist()
+    return Sliding(contact, ca.Function("power", [v, N, p], [power]), needs)
 
 
 @final

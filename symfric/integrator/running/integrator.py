@@ -78,8 +78,6 @@ class Integrator:
         whole: system, if its pivots are not those chosen by default; else None.
         memory: objects that other modules derive from the integrator.
         step: attempt as in `methods.attempt`.
-        f: (y, d) -> right-hand sides.
-        events, resets: (t, y, d) -> event expressions, and values of all resets.
     """
 
     model: Model
@@ -97,19 +95,32 @@ class Integrator:
     def __post_init__(self) -> None:
         self.system: System = self.whole or system(self.model, self.inputs)
         self.step, self.instructions = written(self.system, self.tableau, INLINE)
-        self.f = ca.Function("f", [self.system.y, self.system.d], [self.system.f])
-        self.events, sizes = self._event_functions()
-        resets = (ca.SX(new) for event in self.model.events for new in event.reset.values())
-        self.resets = self.of_time("resets", stacked(resets))
         self.crossings: Crossings | None = None
         if self.model.events:
-            manifold = self.system.manifold
+            manifold, (events, sizes) = self.system.manifold, self._event_functions
             closes, rows = manifold is not None and manifold.m > 0, self.tableau.H.shape[0]
             self.crossings = crossings(
-                self.model, self.events, sizes, self.resets, rows, self.follows, closes
+                self.model, events, sizes, self.resets, rows, self.follows, closes
             )
         self.prospect = Prospect(self._source, ("symfric_march",), self.instructions)
 
+    @cached_property
+    def f(self) -> ca.Function:
+        """Right-hand sides as a Function (y, d)."""
+        return ca.Function("f", [self.system.y, self.system.d], [self.system.f])
+
+    @property
+    def events(self) -> ca.Function:
+        """Event expressions as a Function (t, y, d)."""
+        return self._event_functions[0]
+
+    @cached_property
+    def resets(self) -> ca.Function:
+        """Values of all resets as a Function (t, y, d)."""
+        resets = (ca.SX(new) for event in self.model.events for new in event.reset.values())
+        return self.of_time("resets", stacked(resets))
+
+    @cached_property
     def _event_functions(self) -> tuple[ca.Function, ca.Function]:
         """Return the Functions (t, y, d) of the event expressions and of their magnitudes.
 

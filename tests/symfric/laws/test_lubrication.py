@@ -54,7 +54,7 @@ def test_the_minimum_exists_above_the_stated_film_thickness_only() -> None:
 def test_a_fast_plain_bearing_obeys_petroff() -> None:
     """Torque of shear in the full gap: wall speed over clearance times area times radius."""
     r, L, c, eta, omega, N = 0.02, 0.03, 4e-5, 0.03, 300.0, 200.0
-    bearing = sf.MixedLubrication(0.12, eta, A=2 * r * L, H_m=1e-9, h=c / pi)
+    bearing = sf.MixedLubrication(0.12, eta, A=2 * r * L, H_m=1e-9, h_0=c / pi)
     shear = eta * omega * r / c
     torque = shear * (2 * pi * r * L) * r
     assert r * float(bearing.force(omega * r, N)) == pytest.approx(torque, rel=2e-2)

@@ -1,6 +1,7 @@
 """Moving pictures in every format, whole or not at all, and their geometry."""
 
 from base64 import b64decode
+from io import BytesIO
 from pathlib import Path
 
 import casadi as ca
@@ -21,6 +22,7 @@ from symfric.multibody.results import SPRING
 from symfric.results.animation import SLIDES, STICKS, frame_times, picture
 from symfric.results.strokes import Poses, Stroke, View, look, strokes
 from symfric.scenes import (
+    ALL_SCENES,
     MECHANISMS,
     CoupledBlocks,
     DrillString,
@@ -54,12 +56,42 @@ def test_films_have_a_picture_per_frame_and_need_nothing_from_elsewhere(
     runs["pendulum"].animate(path.with_suffix(".html"), fps=5, speed=0.5)
     text = path.with_suffix(".html").read_text()
     pictures = text.split("data:image/png;base64,")[1:]
-    assert len(pictures) == 3
+    assert len(pictures) == 4  # and their common part
     assert b64decode(pictures[0].split('"')[0]).startswith(b"\x89PNG")
     assert "http" not in text.replace(pictures[0], "")[:2000]
     assert 'max="2"' in text
     assert sorted(p.name for p in path.parent.iterdir()) == ["motion.gif", "motion.html"]
     assert plt.get_fignums() == open_before
+
+
+def test_a_page_lays_each_picture_over_their_common_part(
+    runs: dict[str, Trajectory], tmp_path: Path
+) -> None:
+    """A page shows the pictures of the GIF with the same shades."""
+    run, parts = runs["pendulum"], list[Image.Image]()
+    for ending in ("gif", "html"):
+        run.animate(tmp_path / f"x.{ending}", fps=20, speed=0.5)
+    for part in (tmp_path / "x.html").read_text().split("data:image/png;base64,")[1:]:
+        parts.append(Image.open(BytesIO(b64decode(part.split('"')[0]))).convert("RGBA"))
+    common, *layers = parts
+    with Image.open(tmp_path / "x.gif") as film:
+        assert len(layers) == film.n_frames == 9
+        for k, layer in enumerate(layers):
+            film.seek(k)
+            shown = Image.alpha_composite(common, layer).convert("RGB")
+            assert (np.asarray(shown) == np.asarray(film.convert("RGB"))).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["quarter_car", "coupled_blocks", "four_mass"])
+def test_films_of_scenes_have_at_most_500_kB(name: str, tmp_path: Path) -> None:
+    """The largest of all scenes."""
+    kind = ALL_SCENES[name]
+    run = simulate(kind(BrownMcPhee()).model(), kind.t_end)
+    for ending in ("gif", "html"):
+        path = tmp_path / f"film.{ending}"
+        run.animate(path)
+        assert path.stat().st_size <= 500e3
 
 
 @pytest.mark.parametrize("ending", ["gif", "html"])

@@ -10,10 +10,12 @@ from one_program import along, block_of
 from rigs import prescribed_motion
 from tables import Names, table
 
-from symfric import LoadDependent, LuGre, Sum, Viscous, parameters, simulate
-from symfric.codegen import law_block
+from symfric import LoadDependent, LuGre, MixedLubrication, Sum, Viscous, parameters, simulate
+from symfric.codegen import law_block, plant_block
 from symfric.codegen.blocks.held_step import force_of_rate, held_step
+from symfric.foundation.parameters import param, parametric
 from symfric.laws import GMS, Armstrong, Element, MaxwellSlip, Slider
+from symfric.scenes import Rabinowicz
 
 LOAD = 8.0
 BRISTLE = ["lugre", "dahl", "lugre, delta 0.78, viscous", "lugre+dahl", "asymmetric(lugre)"]
@@ -286,3 +288,16 @@ def test_without_load_viscous_friction_and_preloads_remain():
         LuGre(), LoadDependent(LuGre(), N_0=2.0), CASES["lugre_normalised"]
     )]  # fmt: skip
     assert reported == [True, False, False]
+
+
+@parametric
+class Thick(Viscous):
+    h: float = param(1.0, unit="m", doc="film thickness")
+
+
+def test_the_step_size_is_no_parameter_of_a_law():
+    for make in (law_block, lambda law: plant_block(Rabinowicz(law))):
+        with pytest.raises(ValueError, match="h: expected a parameter of another name"):
+            make(Thick())
+    assert law_block(MixedLubrication()).sample_time is None
+    assert plant_block(Rabinowicz(MixedLubrication())).sample_time == 1e-3
