@@ -247,10 +247,11 @@ def _outputs(
         found[f"{name}_friction"] = Output(size, force, doc, kinds.FRICTION)
         power = ca.dot(s.force, contact.slip)
         found[f"{name}_power"] = Output(power, "W", "power dissipated by friction", kinds.FRICTION)
+    kinetic, potential = eq.kinetic, eq.potential
     for name, value, doc in (
-        ("kinetic", eq.kinetic, "kinetic energy"),
-        ("potential", eq.potential, "potential energy"),
-        ("energy", eq.kinetic + eq.potential, "kinetic and potential energy"),
+        ("kinetic", kinetic, "kinetic energy"),
+        ("potential", potential, "potential energy"),
+        ("energy", kinetic + potential, "kinetic and potential energy"),
     ):
         found[name] = Output(value, "J", doc, kinds.ENERGY)
     if eq.m:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import accumulate, chain, pairwise
 from typing import final
 
@@ -44,7 +45,6 @@ class Equations:
         balance: M a + Phi_q' lam - Q, shape (n, 1), affine in a, lam and F.
         contacts: contacts of all joints and elements with friction.
         normals: normal force of each contact [N], in terms of q, qd, a, lam.
-        kinetic, potential: energies [J].
         reactions: wrench on the child of each joint at its joint point, in the child's joint frame.
         pressing: wrench that loads each bearing: the reaction; for a joint that only closes loops,
             the reaction in the parent's joint frame.
@@ -68,8 +68,6 @@ class Equations:
     balance: ca.SX
     contacts: tuple[Contact, ...]
     normals: tuple[ca.SX, ...]
-    kinetic: ca.SX
-    potential: ca.SX
     reactions: dict[str, Wrench]
     pressing: dict[str, Wrench]
 
@@ -93,10 +91,20 @@ class Equations:
         """Partial derivative of the constraints with respect to time, shape (m, 1)."""
         return ca.jacobian(self.phi, self.kin.t)
 
-    @property
+    @cached_property
     def mass(self) -> ca.SX:
         """Mass matrix M, shape (n, n)."""
         return ca.jacobian(self.balance, self.a)
+
+    @property
+    def kinetic(self) -> ca.SX:
+        """Kinetic energy of all bodies [J]."""
+        return kinetic_energy(self.kin)
+
+    @property
+    def potential(self) -> ca.SX:
+        """Potential energy of all forces [J]."""
+        return sum((force.energy(self.kin) for force in self.forces), ca.SX(0))
 
     @property
     def power(self) -> ca.SX:
@@ -187,11 +195,10 @@ def equations(
     phi_dot = ca.jtimes(phi, q, qd) + ca.jacobian(phi, t)
     phi_ddot = ca.jtimes(phi, q, a) + ca.jtimes(phi_dot, q, qd) + ca.jacobian(phi_dot, t)
     normals = tuple(c.normal(kin, pressing) for c in contacts)
-    potential = sum((f.energy(kin) for f in forces), ca.SX(0))
     return Equations(
         kin, tuple(forces), applied, loops, held, tuple(turns.values()), norms.numel(), q, qd, a,
         lam, stacked(c.F for c in contacts), ca.densify(phi), phi_dot, phi_ddot, ca.densify(rows),
-        contacts, normals, kinetic_energy(kin), potential, reactions, pressing,
+        contacts, normals, reactions, pressing,
     )  # fmt: skip
 
 

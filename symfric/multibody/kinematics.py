@@ -286,12 +286,14 @@ def _carried(base: Motion, link: Link, q: ca.SX, qd: ca.SX, qdd: ca.SX) -> Motio
     R_BP = ca.sparsify(R_BC @ R_PC.T)
     R_BA = ca.sparsify(R_BP @ R_AP.T)
     arm = link.at_base.p + R_AP @ p
-    w_A, own_w, own_v = base.w_B, R_BC @ (H_w @ qd), R_BP @ (H_v @ qd)
-    w = R_BA @ w_A + own_w
-    dw = R_BA @ base.dw_B + ca.cross(R_BA @ w_A, own_w) + R_BC @ (H_w @ qdd + drift_w)
-    dv = R_BA @ (base.dv_B + ca.cross(base.dw_B, arm) + ca.cross(w_A, ca.cross(w_A, arm)))
-    dv += 2 * ca.cross(R_BA @ w_A, own_v) + R_BP @ (H_v @ qdd + drift_v)
-    dv = dv + ca.cross(dw, to_body) + ca.cross(w, ca.cross(w, to_body))
-    v = R_BA @ (base.v_B + ca.cross(w_A, arm)) + own_v + ca.cross(w, to_body)
+    own_w, own_v = R_BC @ (H_w @ qd), R_BP @ (H_v @ qd)
+    w_A, on_arm = R_BA @ base.w_B, ca.cross(base.w_B, arm)
+    w = w_A + own_w
+    on_body = ca.cross(w, to_body)
+    dw = R_BA @ base.dw_B + ca.cross(w_A, own_w) + R_BC @ (H_w @ qdd + drift_w)
+    dv = R_BA @ (base.dv_B + ca.cross(base.dw_B, arm) + ca.cross(base.w_B, on_arm))
+    dv += 2 * ca.cross(w_A, own_v) + R_BP @ (H_v @ qdd + drift_v)
+    dv = dv + ca.cross(dw, to_body) + ca.cross(w, on_body)
+    v = R_BA @ (base.v_B + on_arm) + own_v + on_body
     R_WB = ca.sparsify(base.R @ R_BA.T)
     return Motion(R_WB, base.p + base.R @ arm + R_WB @ to_body, w, v, dw, dv)

@@ -263,8 +263,10 @@ def without_friction(made: Prepared) -> tuple[Array, Array, Array]:
     zero.append(ca.SX.ones(eq.N.numel()))
     expressions = [ca.vertcat(eq.balance, eq.phi_ddot), stacked(eq.normals)]
     rows, normals = ca.substitute(expressions, symbols, zero)
+    own = not eq.m and not ca.depends_on(eq.mass, ca.vertcat(*symbols))
+    slopes = eq.mass if own else ca.jacobian(rows, unknowns)
     arguments = [unknowns, eq.q, eq.qd, symbols_of(made.p)]
-    solve = ca.Function("start", arguments, [rows, ca.jacobian(rows, unknowns), normals])
+    solve = ca.Function("start", arguments, [rows, slopes, normals])
     at = made.q0, made.qd0, ca.DM(starts_of(made.p))
     right, matrix, _ = solve(0, *at)
     x = -np.linalg.lstsq(matrix.full(), right.full()[:, 0], rcond=None)[0]

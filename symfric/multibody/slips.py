@@ -7,7 +7,7 @@ from typing import final
 import casadi as ca
 
 from symfric.foundation.parameters import Variable
-from symfric.foundation.variable import symbols_of
+from symfric.foundation.variable import stacked, symbols_of
 from symfric.laws import Law
 from symfric.laws.base import smooth
 from symfric.laws.base.families import FINEST, rests
@@ -70,9 +70,12 @@ def slips(
         groups: groups of contacts whose laws need the applied force.
     """
     unknowns, pressing = dict[str, Variable](), list[ca.SX]()
-    for contact, normal, start in zip(eq.contacts, eq.normals, normal_at_start, strict=True):
+    reactive, normals = ca.vertcat(eq.a, eq.lam, eq.F), ca.densify(stacked(eq.normals))
+    loaded = ca.which_depends(normals, reactive, 1, True)
+    rows = zip(eq.contacts, eq.normals, normal_at_start, loaded, strict=True)
+    for contact, normal, start, depends in rows:
         law, pressed = contact.friction.law, contact.pressed
-        if ca.depends_on(normal, ca.vertcat(eq.a, eq.lam, eq.F)) and depends_on_load(law):
+        if depends and depends_on_load(law):
             doc = f"normal force of {contact.place} with {type(law).__name__}"
             size, kind = max(1.0, abs(start)), kinds.NORMAL_FORCE
             symbol = ca.SX(0, 0) if contact.normal_symbol.is_empty() else contact.normal_symbol

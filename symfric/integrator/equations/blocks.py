@@ -328,7 +328,7 @@ def _parts(system: System) -> _Parts:
     symbols, values = own.entries[used], own.values(system.y, system.d)[used]
     return _Parts(
         _residual(system),
-        ca.Function("slopes_g", [system.y, system.d], [values], {"cse": True}),
+        ca.Function("slopes_g", [system.y, system.d], [values]),
         ca.Function("pack_g", [symbols], [lu.packed], {"cse": True}),
         ca.Function("solve_g", [lu.symbols, right], [s, change]),
         _sizes(system, W, symbols, moved, [place[i] for i in rows]),

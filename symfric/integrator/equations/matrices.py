@@ -22,7 +22,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.foundation.numeric import Array, nonzeros, reciprocal
+from symfric.foundation.numeric import Array, nonzeros
 
 Order = tuple[tuple[int, int], ...]
 """(row, column) of each pivot, in the order of elimination."""
@@ -77,7 +77,7 @@ class SymbolicLU(NamedTuple):
         rows, columns = (np.argsort(np.argsort([p[i] for p in pivots])) for i in (0, 1))
         sign = ca.SX(round(np.linalg.det(np.eye(len(pivots))[rows][:, columns])))
         for pivot in pivots:
-            sign = sign * ca.sign(self.symbols[pivot.at])
+            sign = times(sign, ca.SX.unary(ca.OP_SIGN, self.symbols[pivot.at]))
         return sign
 
     def pivots(self, rows: Container[int]) -> ca.SX:
@@ -135,7 +135,7 @@ def factorise(matrix: ca.SX, groups: Sequence[Sequence[int]] = (), order: Order 
     for k in range(n):
         row, column = order[k] if order else _pivot(rows, holders, grouped)
         holders[column].discard(row)
-        inverse = reciprocal(rows[row].pop(column))
+        inverse = times(2, ca.SX.binary(ca.OP_DIV, 0.5, rows[row].pop(column)))  # `reciprocal`
         others, below = tuple(rows[row]), tuple(sorted(holders[column]))
         eliminations.append(Pivot(row, column, others, below, len(packed)))
         for c in others:

@@ -26,7 +26,7 @@ only if it is constant.
 
 from collections.abc import Callable, Collection, Hashable, Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import cache, cached_property, partial
+from functools import cached_property
 from math import inf
 from typing import Any, final
 
@@ -36,7 +36,7 @@ from numpy.typing import NDArray
 
 from symfric.foundation.numeric import Array
 from symfric.foundation.status import EnergyWarning, OverloadWarning
-from symfric.foundation.variable import strays, symbols_of
+from symfric.foundation.variable import stacked, strays, symbols_of
 from symfric.integrator.compiled.columns import Columns
 from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.running.integrator import Integrator, remember
@@ -44,7 +44,6 @@ from symfric.integrator.running.record import Run
 from symfric.model import Model
 from symfric.model.contact import APPLIED, Contact
 from symfric.model.forces import by_laws
-from symfric.model.start import Put
 
 SPEEDS = np.array([1e-6, 1e-3, 1.0, 1e3])
 """Slips [m/s] of the first check, in both directions."""
@@ -90,17 +89,15 @@ def _over_time(
     return integrator.memory[name]([t, y, d], backend="vm")[0].T
 
 
-Insert = Callable[[], Put]
-"""Function that returns the substitution of the forces of all laws."""
-
-
-def _determined(model: Model, laws: Insert, write: Callable[[], list[Any]]) -> ca.SX | None:
+def _determined(model: Model, write: Callable[[], list[Any]]) -> ca.SX | None:
     """Return the expressions of a law with the forces of all laws inserted; None if undetermined.
 
     The law or the unknowns of the model may not determine them.
     """
     try:
-        found = laws()(ca.vertcat(*write()))
+        found = ca.vertcat(*write())
+        if ca.depends_on(found, stacked(c.force for c in model.contacts)):
+            found = by_laws(model)(found)
     except (ValueError, TypeError, NotImplementedError):
         return None
     known = ca.vertcat(model.t, *(model.vector(letter) for letter in "xzup"))
@@ -110,19 +107,17 @@ def _determined(model: Model, laws: Insert, write: Callable[[], list[Any]]) -> c
 @final
 @dataclass(frozen=True, eq=False)
 class Sliding:
-    """Actual friction of one contact, and its friction in steady sliding.
+    """Friction of one contact in steady sliding.
 
     Attributes:
         contact: the contact.
         power: (v, N, p) -> power [W] dissipated by steady friction.
         needs: indices of the parameters on which the power depends.
-        rows: slip, friction and steady friction in the model.
     """
 
     contact: Contact
     power: ca.Function
     needs: list[int]
-    rows: ca.SX
     _checked: dict[Hashable, bool] = field(default_factory=dict[Hashable, bool])
 
     def suspect(self, p: Array) -> bool:
@@ -142,7 +137,15 @@ def _gains(
     """Yield a message about a contact whose friction adds energy to the motion."""
     (t, y), contact = run.seen, sliding.contact
     name, unit = f"sliding '{contact.name}'", contact.unit
-    slip, force, steady = _over_time(integrator, inputs, name, sliding.rows, t, y, p)
+
+    def slip_and_forces() -> list[Any]:
+        steady = _steady(contact, contact.slip, contact.N, contact.given)
+        return [contact.slip, contact.friction, steady]
+
+    rows = _determined(integrator.model, slip_and_forces)
+    if rows is None:
+        return
+    slip, force, steady = _over_time(integrator, inputs, name, rows, t, y, p)
     power, worst = force * slip, int(np.argmin(steady * slip))
     work, turnover = (np.diff(t) @ (w[1:] + w[:-1]) / 2 for w in (power, np.abs(power)))
     if steady[worst] * slip[worst] < 0 and work < -SHARE * turnover:
@@ -156,31 +159,27 @@ def _gains(
 def sliding_places(model: Model) -> tuple[Sliding, ...]:
     """Return the contacts of a model whose steady friction is known."""
     if "sliding" not in model.memory:
-        laws = cache(partial(by_laws, model))
-        found = (_sliding(model, c, laws) for c in model.contacts)
-        model.memory["sliding"] = tuple(s for s in found if s)
+        model.memory["sliding"] = tuple(s for c in model.contacts if (s := _sliding(model, c)))
     return model.memory["sliding"]
 
 
-def _sliding(model: Model, contact: Contact, laws: Insert) -> Sliding | None:
-    """Return the friction of a contact; None if the unknowns of the model do not determine it."""
-    law, v, N, p = contact.law, ca.SX.sym("v"), ca.SX.sym("N"), model.vector("p")
+def _steady(contact: Contact, slip: ca.SX, load: ca.SX, given: Mapping[str, Any]) -> ca.SX:
+    """Return the force of a law in steady sliding."""
+    law = contact.law
+    return ca.SX(law.force(slip, load, law.steady_state_at(slip, load, **given), **given))
 
-    def steady(slip: Any, load: Any, given: Mapping[str, Any]) -> ca.SX:
-        return ca.SX(law.force(slip, load, law.steady_state_at(slip, load, **given), **given))
 
-    def rows() -> list[Any]:
-        there = steady(contact.slip, contact.N, contact.given)
-        return [contact.slip, contact.friction, there]
-
-    found = _determined(model, laws, rows)
-    if found is None:
+def _sliding(model: Model, contact: Contact) -> Sliding | None:
+    """Return the steady friction of a contact; None if its law does not determine it."""
+    v, N, p = ca.SX.sym("v"), ca.SX.sym("N"), model.vector("p")
+    try:
+        power = _steady(contact, v, N, dict.fromkeys(contact.given, 0.0)) * v
+    except (ValueError, TypeError, NotImplementedError):
         return None
-    alone = steady(v, N, dict.fromkeys(contact.given, 0.0)) * v
-    if strays(alone, ca.vertcat(v, N, p)):
+    if strays(power, ca.vertcat(v, N, p)):
         return None
-    needs = np.flatnonzero(ca.which_depends(alone, p, 1, False)).tolist()
-    return Sliding(contact, ca.Function("power", [v, N, p], [alone]), needs, found)
+    needs = np.flatnonzero(ca.which_depends(power, p, 1, False)).tolist()
+    return Sliding(contact, ca.Function("power", [v, N, p], [power]), needs)
 
 
 @final
@@ -270,20 +269,17 @@ def overload(held: Held, ratio: float, when: str = "") -> str:
 def places(model: Model) -> tuple[Held, ...]:
     """Return the contacts of a model whose law sticks through its states."""
     if "held" not in model.memory:
-        laws = cache(partial(by_laws, model))
-        found = (_held(model, c, laws) for c in model.contacts)
-        model.memory["held"] = tuple(h for h in found if h)
+        model.memory["held"] = tuple(h for c in model.contacts if (h := _held(model, c)))
     return model.memory["held"]
 
 
-def _held(model: Model, contact: Contact, laws: Insert) -> Held | None:
+def _held(model: Model, contact: Contact) -> Held | None:
     """Return the force that the states of a contact carry; None if force or level are unknown."""
     if not contact.states or APPLIED in contact.given:
         return None
     z, p = symbols_of(contact.states), model.vector("p")
     force_at, N = contact.law.force, contact.N
-    asked = lambda: [force_at(0.0, N, z, **contact.given), contact.most_held]  # noqa: E731
-    both = _determined(model, laws, asked)
+    both = _determined(model, lambda: [force_at(0.0, N, z, **contact.given), contact.most_held])
     if both is None or not ca.depends_on(both[0], z):
         return None
     (force, level), screen = ca.vertsplit(both), None
