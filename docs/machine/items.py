@@ -218,8 +218,8 @@ def scene_page(name: str, kind: type[Scene]) -> str:
     model, law = scene.model(), law_name(RUBS())
     rst = f".. autoclass:: symfric.scenes.{kind.__name__}\n"
     about = f"bodies, elements, directions and contacts of {name}"
-    caption = "Coordinates and velocities are blue, inputs green, contacts with friction and their "
-    caption += f"loads orange, by `symfric scenes {name} --schematic FILE`"
+    caption = "Coordinates, velocities and given forces are blue, inputs green, contacts with "
+    caption += f"friction and their loads orange, by `symfric scenes {name} --schematic FILE`"
     picture = f"/made/scenes/{name}_schematic.png"
     text = f"# {name.replace('_', ' ').capitalize()}\n\n"
     text += directive("figure", picture, caption, alt=about, width="24rem")

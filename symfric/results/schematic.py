@@ -77,8 +77,8 @@ class Page(NamedTuple):
 def schematic(model: Model, path: str | Path | None = None) -> Figure:
     """Return a labelled figure of a machine at its start, 85 mm wide.
 
-    Names of bodies and elements are black, coordinates and velocities with their positive
-    directions blue, inputs green, and contacts with friction and their loads orange.
+    Names of bodies and elements are black, coordinates, velocities and given forces with their
+    positive directions blue, inputs green, and contacts with friction and their loads orange.
 
     Raises:
         ValueError: the model has no sketch.
@@ -202,12 +202,9 @@ def _load(contact: Contact, model: Model) -> str:
 def _symbols(texts: Iterable[str]) -> str:
     """Return symbols as formulas, and values with units as they are."""
     return ", ".join(
-        text if re.match(r"[-\d]", text) else re.sub(r"[A-Za-z]\w*", _named, text) for text in texts
+        text if re.match(r"[-\d]", text) else re.sub(r"[A-Za-z]\w*", lambda m: formula(m[0]), text)
+        for text in texts
     )
-
-
-def _named(match: re.Match[str]) -> str:
-    return formula(match[0])
 
 
 def formula(name: str) -> str:

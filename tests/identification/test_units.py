@@ -38,7 +38,7 @@ def size(unit: str, sizes: Sizes, values: Mapping[str, float]) -> float:
     """Return the size of a unit of sliding, by its letters."""
     force, length, time = sizes
     known = {"N": force, "kg": force * time**2 / length, "m": length, "s": time, "degC": 1.0}
-    known |= {"rad": length, "K": 1.0}
+    known |= {"rad": length, "K": 1.0, "Pa": force / length**2}
     text = unit.replace("N m", "N").replace("kg m^2", "kg").replace(" ", "*").replace("^", "**")
     return float(eval(text, {"__builtins__": {}}, known | dict(values)))
 
@@ -73,8 +73,8 @@ def assert_same(kind: Any, law: str, data: Dataset, some: list[Sizes], **given: 
     known = parameters(Drive(ALL_LAWS[law]()))
     numbers = {n: float(p.value) for n, p in known.items() if len(n) == 1 and p.unit == "1"}
     first: Fitted = Fit(kind, law, data, **given).solve(throw=False)
-    held = [n for n, p in first.parameters.items() if p.fixed and known[n].role != "width"]
-    held = [n for n in held if n != "N"]
+    held = [n for n, p in first.parameters.items() if p.fixed and n != "N"]
+    held = [n for n in held if known[n].role != "width" or known[n].unit == "N"]
     for sizes in some:
         unit = {n: size(p.unit, sizes, numbers) for n, p in known.items() if p.unit != "rad"}
         fixed = {n: unit.get(n, 1.0) * first.parameters[n].value for n in held}

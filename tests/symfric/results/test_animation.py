@@ -83,7 +83,7 @@ def test_a_page_lays_each_picture_over_their_common_part(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["quarter_car", "coupled_blocks", "four_mass"])
+@pytest.mark.parametrize("name", ["quarter_car", "coupled_blocks", "pendulum"])
 def test_films_of_scenes_have_at_most_500_kB(name: str, tmp_path: Path) -> None:
     """The largest of all scenes."""
     kind = ALL_SCENES[name]
