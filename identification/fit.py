@@ -149,13 +149,13 @@ class Fit:
             raise SolveError(f"Fit: {asked.subject.name}: {result.message}", status, result)
         return result
 
-    def _completed(self, whole: "Prepared", asked: "Prepared", live: Live) -> "Refined | None":
+    def _completed(self, whole: "FitSetup", asked: "FitSetup", live: Live) -> "Refined | None":
         """Fit all rows, starting at the values fitted to part of them."""
         if asked.task is whole.task:
             return None
         return self._refined(whole, live.point.w, self.evaluations)
 
-    def _whitened(self, asked: "Prepared", live: Live) -> "Refined | None":
+    def _whitened(self, asked: "FitSetup", live: Live) -> "Refined | None":
         """Fit again with the noise of the path linearised at the values of a first fit."""
         kind, rows = asked.kind, live.task.residuals
         if not (isinstance(kind, Points) and isinstance(rows, PointRows) and rows.noises):
@@ -164,7 +164,7 @@ class Fit:
         kind = replace(kind, near=live.values)
         return self._refined(asked._replace(kind=kind, task=made), live.point.w, self.evaluations)
 
-    def _delayed(self, asked: "Prepared", live: Live) -> "Refined | None":
+    def _delayed(self, asked: "FitSetup", live: Live) -> "Refined | None":
         """Fit again with dead times; return None if the data do not determine them."""
         kind = asked.kind
         if not isinstance(kind, InverseDynamics) or kind.dead_time != "auto":
@@ -193,13 +193,13 @@ class Fit:
         lost, before = (one.minimum.sandwich.null.shape[1] for one in (found.live, live))
         return None if lost > before else found
 
-    def _refined(self, asked: "Prepared", w: Array, evaluations: int) -> "Refined | None":
+    def _refined(self, asked: "FitSetup", w: Array, evaluations: int) -> "Refined | None":
         """Solve a changed problem from the coordinates `w`; return None without residuals."""
         end = descend(asked.task.reduced(w), w, 0, evaluations)
         live = self._live(asked, end.noise, end.w)
         return None if isinstance(live, str) else Refined(asked, live, end)
 
-    def prepared(self) -> "Prepared":
+    def prepared(self) -> "FitSetup":
         """Check the data, choose the subject and set up the residuals, without solving."""
         kind, free = _to_kind(self.kind, self.free)
         findings = findings_of(kind, self.data)
@@ -241,7 +241,7 @@ class Fit:
             raise ValueError(f"data '{findings.name}': {sentence}; then {error}") from None
         easier = tuple(map(posed, getattr(residuals, "easier", ())))
         made = replace(posed(residuals), easier=easier)
-        return Prepared(kind, found, findings, made, made.unknowns.of(values), seen)
+        return FitSetup(kind, found, findings, made, made.unknowns.of(values), seen)
 
     def live(self, noise: dict[str, float], w: Array) -> Live:
         """Return the solved problem at the coordinates `w` of its solution.
@@ -255,7 +255,7 @@ class Fit:
             raise ValueError(f"Fit: {asked.subject.name}: no residuals: {found}")
         return found
 
-    def _live(self, asked: "Prepared", noise: dict[str, float], w: Array) -> Live | str:
+    def _live(self, asked: "FitSetup", noise: dict[str, float], w: Array) -> Live | str:
         """Return the problem at the coordinates `w` of its solution, or a message on failure."""
         made = asked.task.with_noise(noise)
         point = made.at(w)
@@ -297,7 +297,7 @@ def _unknowns(residuals: Residuals, found: Subject) -> Unknowns:
     return unknowns
 
 
-class Prepared(NamedTuple):
+class FitSetup(NamedTuple):
     """Complete definition of a fit before its solution.
 
     Attributes:
@@ -320,7 +320,7 @@ class Prepared(NamedTuple):
 class Refined(NamedTuple):
     """Fit that started from the values of a first fit."""
 
-    asked: Prepared
+    asked: FitSetup
     live: Live
     end: Start
 
@@ -332,7 +332,7 @@ def findings_of(kind: object, data: Dataset) -> Findings:
     return data.check(**{p: n for p, n in roles(kind).items() if any(n in r for r in data)})
 
 
-def _status(asked: Prepared, end: Start, verdict: Verdict, gain: float) -> tuple[Status, str]:
+def _status(asked: FitSetup, end: Start, verdict: Verdict, gain: float) -> tuple[Status, str]:
     """Return status and message of the fit; `gain` is an argument of `Verdict.status`."""
     status, message = verdict.status(end.status, gain), end.message
     if status is Status.DOUBTFUL and not end.status.ok:

@@ -39,7 +39,7 @@ from identification.result.parts import Kind
 from identification.solving.descent import Progress
 from symfric.foundation import checks
 from symfric.foundation.files import json_data
-from symfric.foundation.shown import Shown, Table, columns
+from symfric.foundation.shown import Shown, TextTable, columns
 from symfric.foundation.status import SolveError, Status
 from symfric.laws import Law
 from symfric.laws.composed.populations import cost
@@ -63,7 +63,7 @@ OWN = ("kind", "what", "data")
 
 @final
 @dataclass(frozen=True, eq=False)
-class Row:
+class RankedFit:
     """Result of one law in a ranking.
 
     Attributes:
@@ -116,7 +116,7 @@ class Row:
 
 @final
 @dataclass(frozen=True, eq=False)
-class Ranking:
+class FitRanking:
     """Laws in order of their prediction error; laws that could not be fitted come last.
 
     The first law is the simplest one whose squared error exceeds the smallest by at most the
@@ -129,7 +129,7 @@ class Ranking:
         effective: effective number of samples of all signals together.
     """
 
-    rows: tuple[Row, ...]
+    rows: tuple[RankedFit, ...]
     data: str
     how: str
     effective: float
@@ -145,7 +145,7 @@ class Ranking:
             raise ValueError(f"select: no law could be fitted to data '{self.data}'")
         return self.rows[0].fit
 
-    def __getitem__(self, law: str) -> Row:
+    def __getitem__(self, law: str) -> RankedFit:
         """Return the row of a law by its name."""
         checks.choice("select: law", law, [row.law for row in self.rows])
         return next(row for row in self.rows if row.law == law)
@@ -165,7 +165,7 @@ class Ranking:
     def _repr_html_(self) -> str:  # pyright: ignore[reportUnusedFunction]
         """Return the notebook view: the table and its figure."""
         drawn = any(row.fit is not None for row in self.rows)
-        table = Table(HEADER, tuple(row.cells for row in self.rows), NUMBERS)
+        table = TextTable(HEADER, tuple(row.cells for row in self.rows), NUMBERS)
         return Shown(self.title, table=table).html(self.plot() if drawn else None)
 
     def to_dict(self) -> dict[str, Any]:
@@ -194,7 +194,7 @@ def select(
     executor: Executor | None = None,
     progress: Progress | None = None,
     **fit: Any,
-) -> Ranking:
+) -> FitRanking:
     """Fit several laws to the same data and rank them by their errors on other data.
 
     Args:
@@ -218,10 +218,10 @@ def select(
     folds = checks.count("select: folds", folds, least=0)
     checks.check_names("select", fit, [f.name for f in fields(Fit) if f.name not in OWN])
     residuals: Any = InverseDynamics() if kind is None else kind
-    tried, stopped = list[_Tried | Row](), False
+    tried, stopped = list[_Tried | RankedFit](), False
     for number, (name, what) in enumerate(named.items()):
         if stopped:
-            tried.append(Row(name, sentence=INTERRUPTED))
+            tried.append(RankedFit(name, sentence=INTERRUPTED))
             continue
         if progress is not None:
             progress(name, number / len(named))
@@ -232,7 +232,7 @@ def select(
         except KeyboardInterrupt:  # rank the laws fitted so far
             if not tried:
                 raise
-            tried.append(Row(name, sentence=INTERRUPTED))
+            tried.append(RankedFit(name, sentence=INTERRUPTED))
             stopped = True
     if progress is not None:
         progress("ranked", 1.0)
@@ -244,7 +244,7 @@ def select(
     elif not by and folds > 1:
         how = f"no validation, although {folds} folds were requested"
     rows, n = _ranked(good)
-    return Ranking((*rows, *(t for t in tried if isinstance(t, Row))), data.name, how, n)
+    return FitRanking((*rows, *(t for t in tried if isinstance(t, RankedFit))), data.name, how, n)
 
 
 class _Tried(NamedTuple):
@@ -278,13 +278,13 @@ def _named(laws: Iterable[Any] | Mapping[str, Any]) -> dict[str, Any]:
 
 def _try(
     name: str, asked: Fit, validate: Dataset | None, folds: int, executor: Executor | None
-) -> _Tried | Row:
+) -> _Tried | RankedFit:
     """Fit and validate one law; return a row with the reason if it cannot be fitted."""
     try:
         found = asked.solve(executor=executor, throw=False)
         live = found.alive("select")
     except (ValueError, SolveError) as error:
-        return Row(name, sentence=str(error))
+        return RankedFit(name, sentence=str(error))
     count = sum(not u.nuisance for u in live.task.unknowns.unknowns)
     tried = _Tried(name, found, count, left_of(found, asked.data))
     try:
@@ -301,7 +301,7 @@ def _try(
     return tried
 
 
-def _ranked(good: Sequence[_Tried]) -> tuple[list[Row], float]:
+def _ranked(good: Sequence[_Tried]) -> tuple[list[RankedFit], float]:
     """Return the rows of the fitted laws in order, and the effective number of samples."""
     inside, outside = shared([t.inside for t in good]), shared([t.outside for t in good])
     effective = _effective(good, inside)
@@ -334,22 +334,22 @@ def _close(left: Sequence[Left], best: Sequence[Left]) -> bool:
     return more <= error or left is best
 
 
-def _rank(row: Row) -> tuple[float, float]:
+def _rank(row: RankedFit) -> tuple[float, float]:
     return row.validation if isfinite(row.validation) else inf, row.bic
 
 
-def _complexity(row: Row) -> tuple[float, ...]:
+def _complexity(row: RankedFit) -> tuple[float, ...]:
     return row.parameters, inf if row.operations is None else row.operations, *_rank(row)
 
 
 def _row(
     t: _Tried, validation: float, fitted: float, aicc: float, bic: float, uncertainty: float
-) -> Row:
+) -> RankedFit:
     fit, away = t.fit, validation > DIVERGED
     operations = cost(fit.law).value if isinstance(fit.law, Law) else None
     far = f"On data that were not fitted its error exceeds {DIVERGED:g} %." if away else ""
     sentence = " ".join(s for s in (*fit.verdict.sentences[:1], far, t.why) if s)
-    return Row(
+    return RankedFit(
         t.name, fit.status.name, inf if away else validation, uncertainty, fitted, aicc, bic,
         t.parameters, operations, fit.seconds, sentence, fit,
     )  # fmt: skip

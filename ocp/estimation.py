@@ -30,7 +30,7 @@ from scipy.linalg import eigh, pinvh
 from scipy.stats import chi2
 
 from ocp.formulation.phase import Ranges, as_box, is_range
-from ocp.horizon import Machine, Window
+from ocp.horizon import HorizonFunctions, Window
 from symfric.foundation import checks
 from symfric.foundation.panels import panels, save
 from symfric.foundation.parameters import Variable, check_names
@@ -211,7 +211,7 @@ def estimate(
     first = np.nan_to_num(first) / scale  # states of laws have no start
     walk = np.array([noise.get(v.name, 0.0) for v in states]) / scale
     loads = states[len(model.x) :]
-    machine = Machine(
+    machine = HorizonFunctions(
         *_functions(model, loads, measured, step, steps),
         fixed=(scale, np.array([*values.values()], dtype=float)),
         Q=np.diag(walk**2 * step),
@@ -262,7 +262,7 @@ def _checked(
 def _functions(
     model: Model, loads: Sequence[Variable], measured: Sequence[str], step: float, steps: int
 ) -> tuple[ca.Function, ...]:
-    """Return the functions of (xi, u, scale, p) of a `Machine`; u are the measured inputs."""
+    """Return the first of `HorizonFunctions`, of (xi, u, scale, p); u are the measured inputs."""
     kept: dict[Any, tuple[ca.Function, ...]] = model.memory.setdefault("ocp estimate", {})
     key = tuple(v.name for v in loads), tuple(measured), step, steps
     if key in kept:
@@ -292,7 +292,7 @@ def _functions(
 
 
 def _moved(
-    machine: Machine, y: Array, u: Array, first: Array, horizon: int,
+    machine: HorizonFunctions, y: Array, u: Array, first: Array, horizon: int,
     states: Sequence[Variable], scale: Array, step: float,
 ) -> Estimate:  # fmt: skip
     """Move the horizon over all samples."""

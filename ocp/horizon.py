@@ -34,7 +34,7 @@ DIVERGED = (
 )
 
 
-class Machine(NamedTuple):
+class HorizonFunctions(NamedTuple):
     """Functions of (xi, u, scale, p), their last arguments, covariances, variances and bounds.
 
     xi are states, loads and drifting parameters in units of their `scale`.
@@ -108,7 +108,7 @@ class Window:
         prior: mean and covariance before the first sample.
     """
 
-    machine: Machine
+    machine: HorizonFunctions
     y: Array
     u: Array
     errors: Array

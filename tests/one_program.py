@@ -10,7 +10,7 @@ import numpy as np
 
 from symfric.codegen import Block, law_block
 from symfric.codegen.blocks.block import CBlock
-from symfric.codegen.compared import Run
+from symfric.codegen.compared import ComparedRun
 from symfric.codegen.guards import Status
 from symfric.codegen.runner import WARNINGS, program, run_vm
 from symfric.codegen.source import header, source
@@ -150,5 +150,5 @@ def is_near(program: OneProgram, tolerance: float, steep: Collection[int] = ()) 
     for (k, u, *p), rows in zip(jobs, program.run(jobs), strict=True):
         c, parameters = program.several[k], p[0] if p else None
         expected = run_vm(c, u, rows[:, : len(c.block.states)], parameters)
-        run = Run(c, u, parameters, rows, expected)
+        run = ComparedRun(c, u, parameters, rows, expected)
         assert run.error <= (2e-4 if k in steep else tolerance), (k, c.block.doc, run.worst)

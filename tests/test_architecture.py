@@ -2,6 +2,7 @@
 
 import ast
 import tomllib
+from collections import Counter
 from collections.abc import Callable, Iterator
 from functools import cache
 from graphlib import TopologicalSorter
@@ -15,7 +16,7 @@ PACKAGES = ("symfric", "ocp", "identification")
 SOURCES = [path for package in PACKAGES for path in sorted((ROOT / package).rglob("*.py"))]
 TESTS = sorted((ROOT / "tests").rglob("*.py"))
 FUNCTIONS = ast.FunctionDef | ast.AsyncFunctionDef
-KEPT = FUNCTIONS | ast.Import | ast.ImportFrom | ast.Call | ast.Assert
+KEPT = FUNCTIONS | ast.ClassDef | ast.Import | ast.ImportFrom | ast.Call | ast.Assert
 
 FRONTS = tuple(".".join(p.parent.relative_to(ROOT).parts) for p in SOURCES if p.stem == "__init__")
 """Packages; their modules do not import from their `__init__`."""
@@ -56,7 +57,7 @@ def is_module(name: str) -> bool:
 
 @cache
 def nodes(path: Path) -> list[ast.AST]:
-    """Imports, functions, calls and assertions of a file."""
+    """Imports, functions, classes, calls and assertions of a file."""
     tree = ast.parse(path.read_text(encoding="utf-8"), str(path))
     return [node for node in ast.walk(tree) if isinstance(node, KEPT)]
 
@@ -168,6 +169,11 @@ def test_rules_of_the_source(path: Path) -> object:
     if formulas and module != "symfric.laws.base.smooth":
         wrong += NONSMOOTH & set(calls(path, apart_from="smooth"))
     return wrong
+
+
+def test_at_most_two_classes_share_a_name() -> None:
+    names = Counter(n.name for p in SOURCES for n in nodes(p) if isinstance(n, ast.ClassDef))
+    assert not [name for name, count in names.items() if count > 2]
 
 
 def test_every_package_is_typed_and_none_hides_a_file() -> None:

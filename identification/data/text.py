@@ -26,7 +26,7 @@ RULE = pattern(r"[-=_+|,;\s]*[-=_]{3,}[-=_+|,;\s]*")
 WITH_COMMA, WITH_POINT = (pattern(rf"[-+]?\d*{mark}\d+([eE][-+]?\d+)?") for mark in (",", r"\."))
 
 
-class Rows(NamedTuple):
+class SplitLines(NamedTuple):
     """Lines of a text file split into cells.
 
     Attributes:
@@ -74,7 +74,7 @@ def read_text(file: Path) -> Raw:
     return found or _by_cells(file)
 
 
-def _layout(rows: Rows, where: str) -> Layout:
+def _layout(rows: SplitLines, where: str) -> Layout:
     """Return the layout of the columns.
 
     Raises:
@@ -148,7 +148,7 @@ def _by_cells(file: Path) -> Raw:
     return Raw(file.name, tuple(columns), numbers[0])
 
 
-def _rows(raw: bytes, where: str) -> Rows:
+def _rows(raw: bytes, where: str) -> SplitLines:
     """Return the non-empty lines, split into cells."""
     wide = raw.startswith((b"\xff\xfe", b"\xfe\xff"))
     try:
@@ -171,7 +171,7 @@ def _rows(raw: bytes, where: str) -> Rows:
             plain.append(line)
             numbers.append(number)
     delimiter = _delimiter(plain) if plain else ","
-    return Rows(delimiter, numbers, [_cells(line, delimiter) for line in plain], comments)
+    return SplitLines(delimiter, numbers, [_cells(line, delimiter) for line in plain], comments)
 
 
 def _delimiter(lines: Sequence[str]) -> str:
@@ -223,7 +223,7 @@ def _numeric(row: Sequence[str], comma: bool, share: float = 0.5) -> bool:
     return numbers > 0 and numbers >= share * len(cells)
 
 
-def _first(rows: Rows, comma: bool) -> int | None:
+def _first(rows: SplitLines, comma: bool) -> int | None:
     """Return the index of the first numeric row that is as wide as most of the last rows.
 
     Rows with text and numbers before a header with names of channels are settings of the recorder.
@@ -246,7 +246,7 @@ def _is_name(cell: str) -> bool:
     return bool(name) and not _is_number(cell) and (bool(said) or is_channel(name))
 
 
-def _header(rows: Rows, first: int) -> tuple[list[str] | None, list[str] | None]:
+def _header(rows: SplitLines, first: int) -> tuple[list[str] | None, list[str] | None]:
     """Return names and units of the columns; None for those that the file does not contain."""
     width = _width(rows.cells[first])
     above = [row for row in rows.cells[:first] if len(row) >= width]

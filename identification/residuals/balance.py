@@ -43,7 +43,7 @@ class Coordinate(NamedTuple):
     a: ca.SX
 
 
-class Row(NamedTuple):
+class ForceRow(NamedTuple):
     """Force balance solved for an input, or for the remainder of a coordinate without an input.
 
     Attributes:
@@ -74,7 +74,7 @@ class Balance(NamedTuple):
         preloads: contacts with bristles. Their preloads (`begun`) follow p in `equations`.
     """
 
-    rows: tuple[Row, ...]
+    rows: tuple[ForceRow, ...]
     equations: Sampled
     slips: ca.Function
     slopes: Sampled | None
@@ -166,8 +166,10 @@ def balance(
         driven = {k: int(np.argmax(drives[:, k])) for k in range(len(model.u))}
         rubs = np.ones_like(rubs)
     slips = [tuple(np.flatnonzero(on).tolist()) for on in rubs]
-    known = [Row(model.u[k].name, model.u[k].unit, k, i, slips[i]) for k, i in driven.items()]
-    known += [Row(f"balance of {found[i].rate.name}", units[i], None, i, slips[i]) for i in bearing]
+    known = [ForceRow(model.u[k].name, model.u[k].unit, k, i, slips[i]) for k, i in driven.items()]
+    known += [
+        ForceRow(f"balance of {found[i].rate.name}", units[i], None, i, slips[i]) for i in bearing
+    ]
     count = len(found)
     slip = put(stacked(c.slip for c in model.contacts))
     by_rate = ca.vec(ca.jacobian(slip, w[count : 2 * count, 0]))
@@ -197,7 +199,7 @@ def _preloads(
     return {contacts[k].name: (usual(speeds[k]), shares[i]) for i, k in enumerate(bent)}, shares
 
 
-class Motion(NamedTuple):
+class MeasuredMotion(NamedTuple):
     """Measured motion and inputs of one record.
 
     Attributes:
@@ -251,7 +253,7 @@ def measure(
     called: Mapping[str, str],
     filter: Filter | None,
     noise: Mapping[str, float],
-) -> Motion:
+) -> MeasuredMotion:
     """Differentiate a record with the channels that the model needs.
 
     Args:
@@ -296,7 +298,7 @@ def measure(
         filter = max(each, key=lambda f: f.cutoff)
     motion = [derivatives(x, v, step, filter, t) for t, (x, v) in zip(velocities, raw, strict=True)]
     w = np.vstack([*(part[k] for k in range(3) for part in motion), *forces, record.time])
-    return Motion(record.name, record.time, step, w, velocities, filter)
+    return MeasuredMotion(record.name, record.time, step, w, velocities, filter)
 
 
 def _balances(model: Model, found: Sequence[Coordinate]) -> tuple[ca.SX, ca.SX, ca.SX, list[str]]:

@@ -23,7 +23,7 @@ from identification.data.dataset import Dataset
 from identification.data.record import PositionLoop, Record
 from identification.residuals.evaluation import Array, Blocks, Channel
 from identification.residuals.initial import local, noise_of
-from identification.residuals.stepper import Chain, Feedback, Mass, Tangent, why_no_motion
+from identification.residuals.stepper import Chain, Dual, Feedback, Mass, why_no_motion
 from identification.unknowns.spec import Unknown
 from identification.unknowns.subject import Subject
 from symfric.foundation import checks
@@ -97,14 +97,14 @@ class Controller:
         known = ca.Function("controller", [s, y, r], results)
         count = len(self.reference)
 
-        def act(state: Sequence[Tangent], row: ca.SX) -> tuple[list[Tangent], list[Tangent]]:
+        def act(state: Sequence[Dual], row: ca.SX) -> tuple[list[Dual], list[Dual]]:
             memory, seen = state[2:], state[: y.numel()]
             at = [ca.vertcat(*(q.value for q in part)) for part in (memory, seen)]
             value, by_s, by_y = known(*at, row[:count])
             slope = _times(by_s, memory) + _times(by_y, seen)
-            *new, command = (Tangent(value[i], slope[i, :]) for i in range(self.memory + 1))
+            *new, command = (Dual(value[i], slope[i, :]) for i in range(self.memory + 1))
             force = self.gain * (command.value + row[count])
-            return [Tangent(force, self.gain * command.slope)], new
+            return [Dual(force, self.gain * command.slope)], new
 
         return act
 
@@ -125,7 +125,7 @@ class Controller:
         return ca.Function("begin", [x], [ca.densify(both), ca.densify(ca.jacobian(both, x))])
 
 
-def _times(slopes: ca.SX, parts: Sequence[Tangent]) -> ca.SX:
+def _times(slopes: ca.SX, parts: Sequence[Dual]) -> ca.SX:
     if not parts:
         return ca.SX(0)
     return ca.mtimes(slopes, ca.vertcat(*(part.slope for part in parts)))
@@ -201,7 +201,7 @@ class ClosedLoop:
                 f"{WHERE}: model '{subject.model.name}': expected one input, the force, got "
                 f"{', '.join(mass.inputs) or 'none'}"
             )
-        runs, own, channels, first = list[Run](), list[Unknown](), list[Channel](), 0
+        runs, own, channels, first = list[ControlledRecord](), list[Unknown](), list[Channel](), 0
         for number, record in enumerate(data):
             run, given = self._run(mass, record)
             runs.append(run)
@@ -218,7 +218,7 @@ class ClosedLoop:
         free = tuple(own) if self.x0 == "estimate" else ()
         return LoopRows(subject.names, free, tuple(channels), tuple(runs))
 
-    def _run(self, mass: Mass, record: Record) -> tuple["Run", Array]:
+    def _run(self, mass: Mass, record: Record) -> tuple["ControlledRecord", Array]:
         """Return the record with drive and controller, and its references and disturbance."""
         loop, where = record.loop if self.loop is None else self.loop, f"data '{record.name}'"
         if loop is None:
@@ -239,7 +239,9 @@ class ClosedLoop:
         x, measured = record["x"], {name: record[name] for name in self.signals}
         v = record["v"][0] if "v" in record else local(record.time, x, 0, noise_of(x)).rate
         first = np.array([x[0], float(v)])
-        return Run(record.name, chain, controller.begin(), rows, first, measured), given
+        return ControlledRecord(
+            record.name, chain, controller.begin(), rows, first, measured
+        ), given
 
 
 def _regressors(record: Record, given: Array, signals: Sequence[str]) -> dict[str, Array]:
@@ -260,7 +262,7 @@ def _regressors(record: Record, given: Array, signals: Sequence[str]) -> dict[st
     return found
 
 
-class Run(NamedTuple):
+class ControlledRecord(NamedTuple):
     """Record with its drive and controller.
 
     Attributes:
@@ -301,7 +303,7 @@ class LoopRows(Blocks):
     With x0="estimate", `own` contains position and velocity at the start of each record.
     """
 
-    runs: tuple[Run, ...]
+    runs: tuple[ControlledRecord, ...]
 
     def blocks(self, p: Array, own: Array) -> Iterator[tuple[Array, Array] | str]:
         """Yield the residuals of each signal of each record, and their derivatives."""

@@ -86,7 +86,7 @@ def noise_of(y: Array) -> float:
     return min(found)
 
 
-class Local(NamedTuple):
+class LocalEstimate(NamedTuple):
     """Value and rate of a signal at one time, with standard errors due to white noise."""
 
     value: float
@@ -95,7 +95,7 @@ class Local(NamedTuple):
     rate_error: float
 
 
-def local(t: Array, y: Array, k: int, noise: float) -> Local:
+def local(t: Array, y: Array, k: int, noise: float) -> LocalEstimate:
     """Fit a cubic around sample k to as many samples as agree with it up to noise."""
     found, reach = np.zeros(4), LEAST
     while True:
@@ -114,7 +114,7 @@ def local(t: Array, y: Array, k: int, noise: float) -> Local:
         if reach >= min(MOST, y.size):
             break
         reach *= 2
-    return Local(*found.tolist())
+    return LocalEstimate(*found.tolist())
 
 
 def rates(model: Model) -> dict[str, str]:

@@ -14,15 +14,15 @@ from identification.data.filters import Decimation, Filter, fourth_order_differe
 from identification.data.record import LONG, blocks, some
 from identification.residuals.balance import (
     Balance,
+    ForceRow,
     Mask,
-    Motion,
-    Row,
+    MeasuredMotion,
     balance,
     coordinates,
     measure,
 )
 from identification.residuals.evaluation import DEAD_TIME, Array, Blocks, Channel, shifted_by
-from identification.residuals.sampled import Path, Sampled, preload, same, scaled
+from identification.residuals.sampled import RecordRows, Sampled, preload, same, scaled
 from identification.unknowns.roles import width_of
 from identification.unknowns.spec import Unknown
 from identification.unknowns.subject import Subject
@@ -155,7 +155,7 @@ class Piece:
         kept: for each row of the balance, the indices of the decimated samples that are used.
     """
 
-    motion: Motion
+    motion: MeasuredMotion
     decimation: Decimation
     kept: tuple[NDArray[np.int64], ...]
 
@@ -205,7 +205,7 @@ class Piece:
         return min((kept.size for kept in self.kept), default=FEWEST)
 
 
-def _piece(made: Balance, motion: Motion, model: Model, p: Array, adapts: bool) -> Piece:
+def _piece(made: Balance, motion: MeasuredMotion, model: Model, p: Array, adapts: bool) -> Piece:
     """Select the equations of a record whose low-pass filter includes no undetermined sample.
 
     Args:
@@ -239,7 +239,7 @@ def _piece(made: Balance, motion: Motion, model: Model, p: Array, adapts: bool) 
     return found
 
 
-def _decimated(rows: Sequence[Row], motion: Motion, slow: Sequence[Mask]) -> Piece:
+def _decimated(rows: Sequence[ForceRow], motion: MeasuredMotion, slow: Sequence[Mask]) -> Piece:
     n = motion.t[motion.inside].size
     decimation = Decimation(n, motion.filter.decimation)
     kept: list[NDArray[np.int64]] = []
@@ -250,7 +250,7 @@ def _decimated(rows: Sequence[Row], motion: Motion, slow: Sequence[Mask]) -> Pie
     return Piece(motion, decimation, tuple(kept))
 
 
-def _slips(made: Balance, motion: Motion, model: Model, p: Array) -> dict[str, Array]:
+def _slips(made: Balance, motion: MeasuredMotion, model: Model, p: Array) -> dict[str, Array]:
     """Return the sliding velocity of each contact with bristles, shape (n,)."""
     if not made.preloads:
         return {}
@@ -258,7 +258,7 @@ def _slips(made: Balance, motion: Motion, model: Model, p: Array) -> dict[str, A
     return dict(zip((c.name for c in model.contacts), v.T, strict=True))
 
 
-def _slow(made: Balance, motion: Motion, model: Model, p: Array) -> list[Mask]:
+def _slow(made: Balance, motion: MeasuredMotion, model: Model, p: Array) -> list[Mask]:
     """Return a mask for each contact of the samples at which its static law is undetermined."""
     if not model.contacts:
         return []
@@ -272,7 +272,7 @@ def _slow(made: Balance, motion: Motion, model: Model, p: Array) -> list[Mask]:
     ]
 
 
-def _channels(rows: Sequence[Row], pieces: Sequence[Piece]) -> Iterator[Channel]:
+def _channels(rows: Sequence[ForceRow], pieces: Sequence[Piece]) -> Iterator[Channel]:
     """Yield a channel for each balance of each record."""
     first = 0
     for number, part in enumerate(pieces):
@@ -307,7 +307,7 @@ class InverseRows(Blocks):
     """
 
     sampled: Sampled
-    rows: tuple[Row, ...]
+    rows: tuple[ForceRow, ...]
     pieces: tuple[Piece, ...]
     slopes: Sampled | None
     preloads: int
@@ -385,7 +385,7 @@ class InverseRows(Blocks):
         each = (self._noisy(part, k, p) for part in self.pieces for k in count)
         return np.array([0.0 if e is None else float(np.linalg.norm(e.rows)) for e in each])
 
-    def _noisy(self, part: Piece, k: int, p: Array) -> Path | None:
+    def _noisy(self, part: Piece, k: int, p: Array) -> RecordRows | None:
         """Return G S of row k, divided by the root of the number of equations, and derivatives."""
         motion, here = part.motion, part.decimation.centres
         at = some(here(np.arange(motion.t.size)[motion.inside])[part.kept[k]])

@@ -152,7 +152,7 @@ class Points:
         """Return the velocity over time of a law with states, and its noise."""
         return smooth_path(record, self.x, self.v, self.noise)
 
-    def _table(self, record: Record, load: float, law: Law, imposed: bool) -> "Table":
+    def _table(self, record: Record, load: float, law: Law, imposed: bool) -> "PointTable":
         F, path = record[self.F], SmoothPath(np.zeros(0), np.zeros((record.size, 0)))
         if imposed or (self.v not in record and self.x in record):
             path = self.path(record)
@@ -170,10 +170,10 @@ class Points:
                 raise ValueError(f"data '{record.name}': weight: expected >= 0 and some > 0")
             weights = np.sqrt(weights / weights.mean())
         w = np.vstack([v, N, *(record[i.name] for i in law.inputs)])
-        return Table(record.t, w, F, weights, (v == 0) & (record.t is None), path.errors)
+        return PointTable(record.t, w, F, weights, (v == 0) & (record.t is None), path.errors)
 
 
-class Table(NamedTuple):
+class PointTable(NamedTuple):
     """Imposed values (2 + inputs, n), forces, weights and break-away points of a record.
 
     `errors` (n, m) are those of the velocity, see `SmoothPath`.
@@ -198,7 +198,7 @@ class PointRows(Blocks):
 
     slides: Sampled
     breaks: Sampled | None
-    tables: tuple[Table, ...]
+    tables: tuple[PointTable, ...]
     imposed: bool
     preloads: bool
     noises: tuple[PathNoise, ...] = ()
@@ -213,11 +213,11 @@ class PointRows(Blocks):
         """Residuals of part of the points of long records; None for short ones and over time."""
         if self.imposed or self.channels[-1].rows.stop <= LONG:
             return None
-        tables, channels, first = list[Table](), list[Channel](), 0
+        tables, channels, first = list[PointTable](), list[Channel](), 0
         for table, channel in zip(self.tables, self.channels, strict=True):
             every = slice(None, None, 1 + table.F.size // LONG)
             F, weights, rest = table.F[every], table.weights[every], table.rest[every]
-            thin = Table(None, table.w[:, every], F, weights, rest, table.errors[every])
+            thin = PointTable(None, table.w[:, every], F, weights, rest, table.errors[every])
             rows = slice(first, first := first + thin.F.size)
             t, measured = channel.t[every], channel.measured[every]
             tables.append(thin)
@@ -247,7 +247,7 @@ class PointRows(Blocks):
         noises = list[PathNoise]()
         for k, table in enumerate(self.tables):
 
-            def force(v: Array, k: int = k, table: Table = table) -> Array:
+            def force(v: Array, k: int = k, table: PointTable = table) -> Array:
                 found = self._forces(k, np.vstack([v, table.w[1:]]), p, own)
                 return table.weights * (np.zeros(v.size) if isinstance(found, str) else found[0])
 
@@ -308,7 +308,7 @@ def _break_away(law: Law, p: ca.SX) -> Sampled:
     return Sampled.of(w, p, ca.if_else(side > 0, levels[0], -levels[1]))
 
 
-def _middle(tables: tuple[Table, ...]) -> float:
+def _middle(tables: tuple[PointTable, ...]) -> float:
     """Return the force half-way between the medians of both directions [N]."""
     v, F = (np.concatenate(part) for part in zip(*((t.w[0], t.F) for t in tables), strict=True))
     if not v.min() < 0 < v.max():

@@ -136,7 +136,7 @@ SETTLED = 1e-9
 """Relative change of the algebraic unknowns below which they have converged."""
 
 
-class Path(NamedTuple):
+class RecordRows(NamedTuple):
     """Rows along a record of n samples, (n, m), and their derivatives by p, (n, m, n_p)."""
 
     rows: Array
@@ -240,7 +240,9 @@ class Sampled:
                 pass
         return self._columns[name](rows, first, "auto" if rows[0].shape[0] > LONG else "vm")
 
-    def along(self, w: Array, h: float | Array, p: Array, begin: Array | None = None) -> Path | str:
+    def along(
+        self, w: Array, h: float | Array, p: Array, begin: Array | None = None
+    ) -> RecordRows | str:
         """Return rows at all samples and their derivatives by p, or a message on failure.
 
         Args:
@@ -252,7 +254,9 @@ class Sampled:
         return _Along(self, w.T, h, p, w[:, 0] if begin is None else begin).path()
 
 
-def scaled(of: Sampled | None, w: Array, h: float, p: Array, k: int, sizes: Array) -> Path | None:
+def scaled(
+    of: Sampled | None, w: Array, h: float, p: Array, k: int, sizes: Array
+) -> RecordRows | None:
     """Return the rows of block k at n samples, times `sizes` / sqrt(n), and their derivatives by p.
 
     Blocks have as many rows as `sizes`. None: no rows, or not finite.
@@ -261,7 +265,7 @@ def scaled(of: Sampled | None, w: Array, h: float, p: Array, k: int, sizes: Arra
     if isinstance(found, str):
         return None
     place, each = slice(k * sizes.size, (k + 1) * sizes.size), sizes / np.sqrt(w.shape[1])
-    return Path(found.rows[:, place] * each, found.slopes[:, place] * each[:, None])
+    return RecordRows(found.rows[:, place] * each, found.slopes[:, place] * each[:, None])
 
 
 class _Along:
@@ -275,7 +279,7 @@ class _Along:
         self.y = np.repeat(of.guess[None, :], self.n, axis=0)
         self.rounds = ROUNDS if self.nz and self.ny else 1
 
-    def path(self) -> Path | str:
+    def path(self) -> RecordRows | str:
         """Return the rows and their derivatives."""
         nz, ny = self.nz, self.ny
         for _ in range(self.rounds):
@@ -297,7 +301,7 @@ class _Along:
             slopes += at[:, :, nz : nz + ny] @ dy
         if not (np.isfinite(r).all() and np.isfinite(slopes).all()):
             return "the friction law is not finite at some samples"
-        return Path(r, slopes)
+        return RecordRows(r, slopes)
 
     def at(self, name: str) -> tuple[Array, Array]:
         """Return values (n, m) and derivatives (n, m, k) of a Function at all samples."""

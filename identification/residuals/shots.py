@@ -21,7 +21,7 @@ import casadi as ca
 import numpy as np
 
 from identification.residuals.evaluation import DEAD_TIME, Array, Blocks, Evaluation
-from identification.residuals.stepper import Chain, Mass, Motion, given_inputs, why_no_motion
+from identification.residuals.stepper import Chain, Mass, SteppedMotion, given_inputs, why_no_motion
 from symfric.foundation import checks
 from symfric.foundation.parameters import Variable
 from symfric.foundation.variable import stacked
@@ -84,7 +84,7 @@ KEY = "identification.sampled"
 def sampled_motion(
     model: Model, t: Array, inputs: Array, p: Array, start: Array,
     *, hold: Literal["linear", "held"] = "linear", substeps: int = 2,
-) -> Motion | str:  # fmt: skip
+) -> SteppedMotion | str:  # fmt: skip
     """Return the motion at the instants `t` with its derivatives, or a message if there is none.
 
     Args:
@@ -98,7 +98,8 @@ def sampled_motion(
         substeps: equal steps per sample, each with the mean of the input over the step.
 
     Returns:
-        A `Motion`: states (n, 2) and slopes (n, 2, parameters + 2), the last two by the start.
+        A `SteppedMotion`: states (n, 2) and slopes (n, 2, parameters + 2), the last two by the
+        start.
 
     Raises:
         ValueError: the model is unsuitable, or an array has the wrong size.
@@ -122,7 +123,9 @@ def refined(t: Array, substeps: int) -> Array:
     return np.append((t[:-1, None] + np.diff(t)[:, None] * shares).ravel(), t[-1])
 
 
-def stepped(model: Model, t: Array, between: list[Array], p: Array, start: Array) -> Motion | str:
+def stepped(
+    model: Model, t: Array, between: list[Array], p: Array, start: Array
+) -> SteppedMotion | str:
     """Return the motion for the mean of each input from each instant to the next, (n - 1,)."""
     rows = np.column_stack([np.diff(t), *between])
     start_slopes = np.hstack([np.zeros((2, p.size)), np.eye(2)])

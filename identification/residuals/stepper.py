@@ -96,19 +96,17 @@ def why_not_sampled(model: Model) -> str:
     return ""
 
 
-class Tangent(NamedTuple):
+class Dual(NamedTuple):
     """Value with its derivatives by the parameters and the start, a row (1, n) of SX."""
 
     value: ca.SX
     slope: ca.SX
 
 
-def advance(
-    mass: Mass, at: Sequence[Tangent], p: Tangent, H: ca.SX
-) -> tuple[Tangent, Tangent, ca.SX]:
+def advance(mass: Mass, at: Sequence[Dual], p: Dual, H: ca.SX) -> tuple[Dual, Dual, ca.SX]:
     """Return position and velocity after a step from (x, v, u), and the equation's residual."""
     x, v, u = at
-    middle = Tangent(x.value + H / 2 * v.value, x.slope + H / 2 * v.slope)
+    middle = Dual(x.value + H / 2 * v.value, x.slope + H / 2 * v.slope)
     here = (middle.value, u.value, p.value)
     held, vb, _ = _velocity(mass, here, v.value, H, v.value, SEARCH)
     sides = (middle.slope, u.slope, p.slope)
@@ -129,8 +127,8 @@ def advance(
     moved = ca.if_else(held, 0, 1) * moved
     scale = ca.fabs(v.value) + ca.fabs(free) + mass.creep
     gap = ca.if_else(held, 0, ca.fabs(v1 - v.value - S * a) / scale)
-    new = Tangent(x.value + H / 2 * (v.value + v1), x.slope + H / 2 * (v.slope + moved))
-    return new, Tangent(v1, moved), gap
+    new = Dual(x.value + H / 2 * (v.value + v1), x.slope + H / 2 * (v.slope + moved))
+    return new, Dual(v1, moved), gap
 
 
 def _along(slopes: Any, sides: Sequence[ca.SX]) -> ca.SX:
@@ -183,21 +181,21 @@ def _inside(w: ca.SX, low: ca.SX, high: ca.SX, side: ca.SX) -> ca.SX:
     return ca.logic_and(side * w >= side * low, side * w <= side * high)
 
 
-Feedback = Callable[[Sequence[Tangent], ca.SX], tuple[list[Tangent], list[Tangent]]]
+Feedback = Callable[[Sequence[Dual], ca.SX], tuple[list[Dual], list[Dual]]]
 """Function (x, v, controller states; row of a sample) -> (inputs, controller states)."""
 
 
 def given_inputs(count: int) -> Feedback:
     """Return a feedback without a controller, whose inputs are those in the rows."""
 
-    def feedback(state: Sequence[Tangent], row: ca.SX) -> tuple[list[Tangent], list[Tangent]]:
+    def feedback(state: Sequence[Dual], row: ca.SX) -> tuple[list[Dual], list[Dual]]:
         still = ca.SX(1, state[0].slope.shape[1])
-        return [Tangent(row[i], still) for i in range(count)], []
+        return [Dual(row[i], still) for i in range(count)], []
 
     return feedback
 
 
-class Motion(NamedTuple):
+class SteppedMotion(NamedTuple):
     """Motion at n + 1 instants, inputs in the n samples between them, and all derivatives.
 
     Attributes:
@@ -214,9 +212,9 @@ class Motion(NamedTuple):
     input_slopes: Array
     gap: float
 
-    def every(self, k: int) -> "Motion":
+    def every(self, k: int) -> "SteppedMotion":
         """Return the motion at every k-th instant, with the inputs that begin there."""
-        return Motion(*(part[::k] for part in self[:4]), gap=self.gap)
+        return SteppedMotion(*(part[::k] for part in self[:4]), gap=self.gap)
 
 
 @final
@@ -254,12 +252,12 @@ class Chain:
         values, gap, slope = ca.SX.sym("s", n), ca.SX.sym("gap"), ca.SX.sym("S", n, many)
         length, given, p = ca.SX.sym("length"), ca.SX.sym("row", row), ca.SX.sym("p", count)
         by_p = ca.horzcat(ca.SX.eye(count), ca.SX(count, 2))
-        before = [Tangent(values[i], slope[i, :]) for i in range(n)]
+        before = [Dual(values[i], slope[i, :]) for i in range(n)]
         inputs, after = feedback(before, given)
         u = _stacked(inputs)
         x, v, most = before[0], before[1], gap
         for _ in range(substeps):
-            x, v, left = advance(mass, (x, v, u), Tangent(p, by_p), length / substeps)
+            x, v, left = advance(mass, (x, v, u), Dual(p, by_p), length / substeps)
             most = most + left**4  # unlike a maximum, this norm keeps NaN
         new = _stacked([x, v, *after])
         arguments = [ca.vertcat(values, gap, ca.vec(slope)), ca.vertcat(length, given), p]
@@ -274,7 +272,7 @@ class Chain:
     def __getstate__(self) -> dict[str, Any]:
         return {field.name: getattr(self, field.name) for field in fields(self)}
 
-    def __call__(self, rows: Array, p: Array, start: Array, start_slopes: Array) -> Motion:
+    def __call__(self, rows: Array, p: Array, start: Array, start_slopes: Array) -> SteppedMotion:
         """Return the motion that begins at `start`.
 
         Args:
@@ -289,7 +287,7 @@ class Chain:
         backend = "vm" if find_compiler() is None else "compiled"
         after, inputs = self._columns([rows, same], first, backend)
         every = np.vstack([first, after])
-        return Motion(
+        return SteppedMotion(
             states=every[:, :n],
             slopes=every[:, n + 1 :].reshape(len(every), many, n).transpose(0, 2, 1),
             inputs=inputs[:, :k],
@@ -298,13 +296,13 @@ class Chain:
         )
 
 
-def _stacked(parts: Sequence[Tangent]) -> Tangent:
+def _stacked(parts: Sequence[Dual]) -> Dual:
     """Return values and dense derivatives stacked in columns."""
     value, slope = zip(*parts, strict=True) if parts else ((), ())
-    return Tangent(ca.vertcat(*value), ca.densify(ca.vertcat(*slope)))
+    return Dual(ca.vertcat(*value), ca.densify(ca.vertcat(*slope)))
 
 
-def why_no_motion(motion: Motion) -> str:
+def why_no_motion(motion: SteppedMotion) -> str:
     """Return why a motion is unusable; "" if it is usable."""
     finite = np.isfinite(motion.states).all(axis=1)
     if not finite.all():

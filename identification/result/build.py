@@ -19,8 +19,8 @@ from identification.result.fitted import Fitted
 from identification.result.outcome import sides_of
 from identification.result.parts import (
     Asked,
-    Curve,
     Estimate,
+    FrictionCurve,
     Kind,
     Line,
     Live,
@@ -276,7 +276,7 @@ def _series(live: Live, records: Sequence[str], verdict: Verdict) -> tuple[Serie
     return tuple(found)
 
 
-def _curve(live: Live) -> Curve | None:
+def _curve(live: Live) -> FrictionCurve | None:
     """Return friction over velocity of a law in a drive or fitted to points; None for others."""
     law, machine, data = live.closed.law, live.closed.scene, live.data
     if isinstance(machine, Drive):
@@ -291,7 +291,9 @@ def _curve(live: Live) -> Curve | None:
     return _banded(live, _of_points(law, load, points, data.rotary), load)
 
 
-def _of_points(law: Law, N: float, points: dict[str, tuple[Array, Array]], turning: bool) -> Curve:
+def _of_points(
+    law: Law, N: float, points: dict[str, tuple[Array, Array]], turning: bool
+) -> FrictionCurve:
     """Return the curve of a law with measured points (v, F) of each record."""
     lines = {name: Line(v, F) for name, (v, F) in points.items()}
     inputs = [f"{i.name} = {i.steady:g} {i.unit}" for i in law.inputs if i.name != FORCE]
@@ -299,7 +301,7 @@ def _of_points(law: Law, N: float, points: dict[str, tuple[Array, Array]], turni
     return _over_velocity(law, N, lines, turning, says)
 
 
-def _of_drive(drive: Drive, records: Sequence[Record]) -> Curve:
+def _of_drive(drive: Drive, records: Sequence[Record]) -> FrictionCurve:
     """Return the curve of the law of a drive, with force - m a - offset of the records.
 
     Records without position, force or equal intervals have no points.
@@ -319,7 +321,9 @@ def _of_drive(drive: Drive, records: Sequence[Record]) -> Curve:
     return _over_velocity(drive.law, float(drive.N), lines, drive.turning, says)
 
 
-def _over_velocity(law: Law, N: float, lines: dict[str, Line], turning: bool, says: str) -> Curve:
+def _over_velocity(
+    law: Law, N: float, lines: dict[str, Line], turning: bool, says: str
+) -> FrictionCurve:
     """Return the curve with every n-th point of the lines, at most about `DOTS` in total."""
     every = max(1, -(-sum(line.t.size for line in lines.values()) // DOTS))
     measured = {name: Line(line.t[::every], line.y[::every]) for name, line in lines.items()}
@@ -334,10 +338,10 @@ def _over_velocity(law: Law, N: float, lines: dict[str, Line], turning: bool, sa
     if ways.size == 1:  # the data do not show the other direction
         v = np.sort(ways[0] * side)
     unit = turned if turning else str
-    return Curve(unit("m/s"), unit("N"), Line(v, steady_force(law, v, N)), measured, says)
+    return FrictionCurve(unit("m/s"), unit("N"), Line(v, steady_force(law, v, N)), measured, says)
 
 
-def _banded(live: Live, curve: Curve, N: float) -> Curve:
+def _banded(live: Live, curve: FrictionCurve, N: float) -> FrictionCurve:
     """Return a curve with its 95 % band, without it if a value of the law has no interval.
 
     half width t sqrt(g' C g),   g = dF/dp by central differences of part of a standard error

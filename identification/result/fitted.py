@@ -8,14 +8,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
 
 from identification.data.dataset import Dataset
-from identification.result.outcome import Outcome, sentences
+from identification.result.outcome import FitFields, sentences
 from identification.result.parts import Errors, Live
 from identification.verdict.bootstrap import Bootstrap, bootstrap
 from identification.verdict.profile import Profile, profile
 from symfric.foundation import packed
 from symfric.foundation.files import write_text
 from symfric.foundation.parameters import Parametric
-from symfric.foundation.shown import Shown, Table
+from symfric.foundation.shown import Shown, TextTable
 from symfric.model import Model
 from symfric.results.stored import Format
 from symfric.scenes.base import Scene
@@ -23,12 +23,12 @@ from symfric.scenes.base import Scene
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from identification.result.page import Ranking
+    from identification.result.page import ShownRanking
 
 
 @final
 @dataclass(frozen=True, eq=False, repr=False)
-class Fitted(packed.Portable, Outcome):
+class Fitted(packed.Portable, FitFields):
     """Result of a fit.
 
     `print(fit)` prints a one-page report, `fit.to_html("out.html")` writes a report with figures,
@@ -90,7 +90,7 @@ class Fitted(packed.Portable, Outcome):
             (n, *("–" if x is None else f"{x:.6g}" for x in (e.value, e.low, e.high)), e.unit)
             for n, e in named
         )
-        table = Table(("parameter", "value", "95 % from", "to", "unit"), rows, (1, 2, 3))
+        table = TextTable(("parameter", "value", "95 % from", "to", "unit"), rows, (1, 2, 3))
         title = f"{self.name} fitted by {self.kind}: {self.status.name}"
         return Shown(title, tuple(sentences(self)), table).html(self.plot())
 
@@ -169,7 +169,7 @@ class Fitted(packed.Portable, Outcome):
 
         return picture(self, names, path)
 
-    def to_html(self, path: str | Path, ranking: "Ranking | None" = None) -> None:
+    def to_html(self, path: str | Path, ranking: "ShownRanking | None" = None) -> None:
         """Write one self-contained HTML page with all results, without network or scripts.
 
         Args:

@@ -9,7 +9,7 @@ from typing import final
 from identification.data.dataset import Dataset
 from identification.data.findings import Finding, texts
 from identification.residuals.evaluation import Array
-from identification.result.parts import Asked, Curve, Errors, Estimate, Live, Series, Tried
+from identification.result.parts import Asked, Errors, Estimate, FrictionCurve, Live, Series, Tried
 from identification.verdict.judge import Verdict
 from symfric.foundation.parameters import Parametric
 from symfric.foundation.shown import columns
@@ -98,7 +98,7 @@ def sides_of(data: Dataset, estimates: Mapping[str, Estimate]) -> Iterator[Sides
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Outcome:
+class FitFields:
     """Fields of a fit, described in `Fitted`, and their text."""
 
     name: str
@@ -118,7 +118,7 @@ class Outcome:
     starts: tuple[Tried, ...]
     findings: tuple[Finding, ...]
     series: tuple[Series, ...]
-    curve: Curve | None
+    curve: FrictionCurve | None
     law: Law | None
     machine: Parametric | None
     seconds: float
@@ -147,7 +147,7 @@ class Outcome:
         agree("Fitted", self.correlation.shape == (n, n), {*self.names} <= self.parameters.keys())
 
 
-def text_of(fit: Outcome) -> str:
+def text_of(fit: FitFields) -> str:
     """Return the text of `print(fit)` within 80 columns."""
     blocks = [
         [f"{fit.name} fitted by {fit.kind}: {fit.status.name}", *_indented(sentences(fit))],
@@ -162,7 +162,7 @@ def text_of(fit: Outcome) -> str:
     return "\n\n".join("\n".join(block) for block in blocks if block)
 
 
-def sentences(fit: Outcome) -> list[str]:
+def sentences(fit: FitFields) -> list[str]:
     """Return the messages on the whole fit in order of importance, without repetition."""
     messages = [*fit.verdict.sentences, *fit.directions]
     message = fit.message
@@ -228,12 +228,12 @@ def remark(e: Estimate) -> str:
     return f"held: {e.note}" if e.fixed and e.note else ("held" if e.fixed else e.note)
 
 
-def best_starts(fit: Outcome) -> int:
+def best_starts(fit: FitFields) -> int:
     """Return the number of starts that ended at the lowest cost."""
     return sum(s.above < SAME for s in fit.starts)
 
 
-def correlated(fit: Outcome) -> list[tuple[str, str, float]]:
+def correlated(fit: FitFields) -> list[tuple[str, str, float]]:
     """Return the pairs of estimates with a correlation above `CLOSE`, the largest first."""
     n = len(fit.names)
     pairs = [
@@ -250,7 +250,7 @@ def _indented(texts: Iterable[str]) -> Iterator[str]:
         yield from wrap(text, WIDTH, initial_indent="  ", subsequent_indent="  ")
 
 
-def _head(fit: Outcome) -> Iterator[str]:
+def _head(fit: FitFields) -> Iterator[str]:
     """Yield the lines on data, effort and noise."""
     rows = sum(e.rows for e in fit.errors.values())
     named = fit.records[:4]
@@ -270,7 +270,7 @@ def _head(fit: Outcome) -> Iterator[str]:
         yield from wrap(f"noise   {', '.join(noise)}", WIDTH, subsequent_indent=" " * 8)
 
 
-def parted(fit: Outcome) -> tuple[dict[str, Estimate], dict[str, Estimate], dict[str, Estimate]]:
+def parted(fit: FitFields) -> tuple[dict[str, Estimate], dict[str, Estimate], dict[str, Estimate]]:
     """Return requested parameters, held parameters, and start values and dead times of records."""
     every = fit.parameters.items()
     fitted = {n: e for n, e in every if not e.fixed}
@@ -279,7 +279,7 @@ def parted(fit: Outcome) -> tuple[dict[str, Estimate], dict[str, Estimate], dict
     return requested, {n: e for n, e in every if e.fixed}, nuisance
 
 
-def _parameters(fit: Outcome) -> Iterator[str]:
+def _parameters(fit: FitFields) -> Iterator[str]:
     requested, held, nuisance = parted(fit)
     if requested:
         yield from _table("parameter", requested)
@@ -307,7 +307,7 @@ def _table(name: str, estimates: dict[str, Estimate]) -> Iterator[str]:
 DRIVING = "at motor and current: to drive the load, per speed and angle of the motor"
 
 
-def machine_units(fit: Outcome) -> list[tuple[str, ...]]:
+def machine_units(fit: FitFields) -> list[tuple[str, ...]]:
     """Return rows of name and value at the load, at the motor and as a current."""
     rows: list[tuple[str, ...]] = []
     for s in fit.sides:
@@ -318,7 +318,7 @@ def machine_units(fit: Outcome) -> list[tuple[str, ...]]:
     return rows
 
 
-def _sides(fit: Outcome) -> Iterator[str]:
+def _sides(fit: FitFields) -> Iterator[str]:
     if fit.sides:
         header = ("of the drive", "at the load", "at the motor", "current")
         yield from columns([header, *machine_units(fit)])
@@ -328,7 +328,7 @@ def _sides(fit: Outcome) -> Iterator[str]:
             yield "per turn of the output, rotor_inertia and torque_constant"
 
 
-def _correlations(fit: Outcome) -> Iterator[str]:
+def _correlations(fit: FitFields) -> Iterator[str]:
     pairs = correlated(fit)
     if pairs:
         yield f"correlation above {CLOSE:g}"
@@ -347,7 +347,7 @@ def errors_table(title: str, errors: Errors) -> Iterator[str]:
         yield from columns(rows)
 
 
-def _data(fit: Outcome) -> Iterator[str]:
+def _data(fit: FitFields) -> Iterator[str]:
     if fit.findings:
         yield "doubtful in the data"
         yield from _indented([*texts(fit.findings, fit.records)])

@@ -12,7 +12,7 @@ from identification.result.outcome import (
     DRIVING,
     MANY,
     SAME,
-    Outcome,
+    FitFields,
     best_starts,
     correlated,
     count_of,
@@ -27,12 +27,12 @@ from identification.result.outcome import (
     unit_of,
     with_unit,
 )
-from identification.result.parts import Curve, Errors, Estimate, Series, limits
+from identification.result.parts import Errors, Estimate, FrictionCurve, Series, limits
 from identification.result.stored import source_of
 from identification.verdict.judge import Test
 from symfric.foundation.status import Status
 from symfric.page import html
-from symfric.page.svg import Axis, Band, Dots, Level, Mark, Path, Stems, around, chart
+from symfric.page.svg import Axis, Band, Dots, Level, Mark, Polyline, Stems, around, chart
 
 WINDOWS = 60
 """Largest number of window starts that are drawn."""
@@ -42,7 +42,7 @@ FLOOR = 1e-3
 
 def signal_charts(one: Series) -> str:
     """Return the chart of the measured and fitted signal, and that of the residuals."""
-    shape = Path if one.ordered else Dots
+    shape = Polyline if one.ordered else Dots
     name, _, unit = one.abscissa.rstrip("]").partition(" [")
     low, high = float(one.residual.t.min()), float(one.residual.t.max())
     x = around(name, unit, [one.residual.t])
@@ -83,7 +83,7 @@ def lags(one: Series) -> str:
     return chart(title, x, y, marks, height=190.0, says=says)
 
 
-def friction(curve: Curve, name: str) -> str:
+def friction(curve: FrictionCurve, name: str) -> str:
     """Return the chart of friction over velocity, with dots for the data and a line for the law."""
     dots = [Dots("measured sample", line.t, line.y) for line in curve.measured.values()]
     low, high = limits(curve)
@@ -91,8 +91,11 @@ def friction(curve: Curve, name: str) -> str:
     sides = (-1.0, 1.0) if curve.half.size else ()
     marks: list[Mark] = [
         *dots,
-        Path("law", curve.law.t, curve.law.y, name),
-        *(Path("limit", curve.law.t, curve.law.y + side * curve.half, "95 %") for side in sides),
+        Polyline("law", curve.law.t, curve.law.y, name),
+        *(
+            Polyline("limit", curve.law.t, curve.law.y + side * curve.half, "95 %")
+            for side in sides
+        ),
         Dots("measured", np.zeros(0), np.zeros(0), curve.says),
     ]
     says = f"friction of {name} over velocity, {float(curve.law.y.min()):.4g} to "
@@ -101,7 +104,7 @@ def friction(curve: Curve, name: str) -> str:
     return chart("Friction over velocity", x, y, marks, height=300.0, says=says)
 
 
-def waterfall(fit: Outcome) -> str:
+def waterfall(fit: FitFields) -> str:
     """Return the chart of the starts' costs above the best one; "" for a single start."""
     above = np.sort([s.above for s in fit.starts if isfinite(s.above)])
     if above.size < 2:
@@ -114,7 +117,7 @@ def waterfall(fit: Outcome) -> str:
     y = around(name, "", [shown, np.array([FLOOR, 10.0])], logarithmic=True)
     marks: list[Mark] = [
         Level("bound", SAME),
-        Path("zero", numbers, shown),
+        Polyline("zero", numbers, shown),
         Dots("good", numbers[same], shown[same], "the same minimum"),
         Dots("bad", numbers[~same], shown[~same], "another minimum, or none"),
     ]
@@ -122,7 +125,7 @@ def waterfall(fit: Outcome) -> str:
     return chart("Waterfall of the starts", x, y, marks, height=210.0, says=says)
 
 
-class Ranking(Protocol):
+class ShownRanking(Protocol):
     """Result of `select`, restricted to what the page shows."""
 
     def to_dict(self) -> dict[str, Any]:
@@ -130,7 +133,7 @@ class Ranking(Protocol):
         ...
 
 
-def page_of(fit: Outcome, ranking: Ranking | None = None) -> str:
+def page_of(fit: FitFields, ranking: ShownRanking | None = None) -> str:
     """Return the page as HTML text."""
     sections = [
         ("parameters", "Parameters", "Parameters", _parameters(fit)),
@@ -162,7 +165,7 @@ def page_of(fit: Outcome, ranking: Ranking | None = None) -> str:
     return html.page(f"{fit.name}: fit", "en", body)
 
 
-def _parameters(fit: Outcome) -> Iterator[str]:
+def _parameters(fit: FitFields) -> Iterator[str]:
     requested, held, nuisance = parted(fit)
     yield _estimates("Fitted, with 95 % intervals", requested)
     rows = [(n, number(e.value), _unit(e.unit), e.note) for n, e in held.items()]
@@ -216,14 +219,14 @@ def _errors(caption: str, errors: Errors, records: Sequence[str]) -> str:
     return html.table(caption, header, rows, (2, 3, 4, 5, 6))
 
 
-def _data(fit: Outcome) -> Iterator[str]:
+def _data(fit: FitFields) -> Iterator[str]:
     yield _errors("Residuals of each signal", fit.errors, fit.records)
     yield _errors("The same parameters on other data", fit.validation or {}, ())
     for one in fit.series:
         yield html.figure(signal_charts(one))
 
 
-def _friction(fit: Outcome) -> Iterator[str]:
+def _friction(fit: FitFields) -> Iterator[str]:
     if fit.curve is not None:
         yield html.figure(
             friction(fit.curve, fit.name),
@@ -231,7 +234,7 @@ def _friction(fit: Outcome) -> Iterator[str]:
         )
 
 
-def _residuals(fit: Outcome) -> Iterator[str]:
+def _residuals(fit: FitFields) -> Iterator[str]:
     tests = fit.verdict.tests
     missed = [t for t in tests if not t.passed]
     if missed:
@@ -265,7 +268,7 @@ def _tests(caption: str, tests: Sequence[Test]) -> str:
     return html.table(caption, header, rows, (2, 3, 4), kinds)
 
 
-def _starts(fit: Outcome) -> Iterator[str]:
+def _starts(fit: FitFields) -> Iterator[str]:
     if len(fit.starts) < 2:
         return
     yield html.paragraph(
@@ -288,7 +291,7 @@ def above(value: float) -> str:
     return "0" if abs(value) < 1e-6 else number(value, 3)
 
 
-def _ranking(ranking: Ranking | None) -> Iterator[str]:
+def _ranking(ranking: ShownRanking | None) -> Iterator[str]:
     rows = [] if ranking is None else list(ranking.to_dict()["rows"])
     if rows:
         names = [name for name in rows[0] if name != "sentence"]
@@ -306,7 +309,7 @@ def _cell(value: object) -> str:
     return number(float(value), 4) if isinstance(value, int | float) else str(value)
 
 
-def _findings(fit: Outcome) -> Iterator[str]:
+def _findings(fit: FitFields) -> Iterator[str]:
     rows = [
         (first_of(names), f.signal, f.kind, f.severity, f.sentence)
         for names, f in grouped(fit.findings, fit.records)
@@ -315,7 +318,7 @@ def _findings(fit: Outcome) -> Iterator[str]:
     yield html.table("Findings of the checks", header, rows, (), ["note"] * len(rows))
 
 
-def _made(fit: Outcome) -> Iterator[str]:
+def _made(fit: FitFields) -> Iterator[str]:
     made = [(name, text) for name, text in fit.made.items() if text]
     yield html.table("Call and versions", ("what", ""), made)
     if fit.law is not None:

@@ -188,7 +188,7 @@ def labels(residuals: Residuals) -> list[str]:
 
 @final
 @dataclass(frozen=True, eq=False)
-class Curve:
+class FrictionCurve:
     """Friction over velocity of a law and of measured points.
 
     Attributes:
@@ -208,7 +208,7 @@ class Curve:
     half: Array = field(default_factory=lambda: np.zeros(0))
 
 
-def limits(curve: Curve) -> tuple[float, float]:
+def limits(curve: FrictionCurve) -> tuple[float, float]:
     """Return a range of forces that contains the curve and all but the farthest points."""
     dots = np.concatenate([line.y for line in curve.measured.values()] or [np.zeros(0)])
     ends = [*np.percentile(dots, [0.2, 99.8])] if dots.size else []

@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from identification.result.outcome import Outcome
-from identification.result.parts import Curve, Series, limits
+from identification.result.outcome import FitFields
+from identification.result.parts import FrictionCurve, Series, limits
 from symfric.foundation import checks
 from symfric.foundation.panels import grid, panels, save
 from symfric.foundation.style import colour
@@ -18,7 +18,7 @@ SHOWN = 4
 """Number of signals that are drawn by default, each in three panels."""
 
 
-def picture(fit: Outcome, names: Sequence[str] = (), path: str | Path | None = None) -> Figure:
+def picture(fit: FitFields, names: Sequence[str] = (), path: str | Path | None = None) -> Figure:
     """Plot friction over velocity, and data, fit, residuals and autocorrelation of each signal.
 
     Args:
@@ -58,7 +58,7 @@ def _legend(axis: Axes, columns: int = 3) -> None:
     )  # fmt: skip
 
 
-def _curve(axis: Axes, curve: Curve, name: str) -> None:
+def _curve(axis: Axes, curve: FrictionCurve, name: str) -> None:
     for line in curve.measured.values():
         axis.plot(line.t, line.y, ".", color="0.6", ms=8.0, mew=0, alpha=0.6, rasterized=True)
     axis.plot([], [], ".", color="0.6", label=curve.says)

@@ -17,7 +17,7 @@ from typing import Any, Union, get_args, get_origin
 
 import numpy as np
 
-from identification.result.outcome import Outcome
+from identification.result.outcome import FitFields
 from symfric.foundation import checks, storable
 from symfric.foundation.files import read_json
 from symfric.foundation.parameters import Parametric
@@ -170,7 +170,7 @@ NEWER = {"sides"}
 """Fields that files of earlier versions do not have."""
 
 
-def to_dict(fit: Outcome) -> dict[str, Any]:
+def to_dict(fit: FitFields) -> dict[str, Any]:
     """Return all fields except the problem, with the law as text and as data, and the drive."""
     data = {f.name: plain(getattr(fit, f.name)) for f in fields(fit) if f.name not in APART}
     return {
@@ -191,7 +191,9 @@ def _plain_or_none(held: Parametric | None) -> dict[str, Any] | None:
         return None
 
 
-def read(kind: type[Outcome], path: str | Path, own: Mapping[str, type[Parametric]] | None) -> Any:
+def read(
+    kind: type[FitFields], path: str | Path, own: Mapping[str, type[Parametric]] | None
+) -> Any:
     """Read a fit that was written to `path`; see `Fitted.from_json`."""
     what = "a file that fit.to_json(path) wrote"
     data = read_json("fit", path, what)
@@ -210,7 +212,7 @@ def read(kind: type[Outcome], path: str | Path, own: Mapping[str, type[Parametri
         ) from None
 
 
-def _made(kind: type[Outcome], data: dict[str, Any], own: Mapping[str, type[Parametric]] | None):
+def _made(kind: type[FitFields], data: dict[str, Any], own: Mapping[str, type[Parametric]] | None):
     hints = storable.hints_of(kind)
     values: dict[str, Any] = {
         f.name: revived(hints[f.name], data[f.name])

@@ -50,7 +50,7 @@ LEAP = 2.0
 """Largest change of the logarithm of a parameter in one step."""
 
 
-class Equations(NamedTuple):
+class JointRows(NamedTuple):
     """Rows of the joints that move, in order of record, joint and time.
 
     Attributes:
@@ -73,7 +73,7 @@ class Equations(NamedTuple):
     def of(
         cls, model: RobotModel, motions: Sequence[RobotMotion], base: Base, rotors: bool,
         every: bool = False,
-    ) -> "Equations":  # fmt: skip
+    ) -> "JointRows":  # fmt: skip
         """Return the rows of all records without reversals, or `every` row."""
         blocks = list[tuple[Any, ...]]()
         for record, one in enumerate(motions):
@@ -89,9 +89,9 @@ class Equations(NamedTuple):
         joined = cast(Any, [np.concatenate(part) for part in zip(*blocks, strict=True)])
         return cls(*joined)
 
-    def at(self, rows: NDArray[np.bool_]) -> "Equations":
+    def at(self, rows: NDArray[np.bool_]) -> "JointRows":
         """Return some of the rows."""
-        return Equations(*(column[rows] for column in cast(Any, self)))
+        return JointRows(*(column[rows] for column in cast(Any, self)))
 
     def linearised(self, laws: Sequence[JointLaw], x: Array) -> tuple[Array, Array]:
         """Return all columns (rows, p) at the values x, and the predicted torques (rows,)."""
@@ -135,7 +135,7 @@ class Seen(NamedTuple):
     d: Array
     Vt: Array
 
-    def without_faint(self, equations: Equations, base: Base) -> Equations:
+    def without_faint(self, equations: JointRows, base: Base) -> JointRows:
         """Return the equations without combinations that only change torques far below noise."""
         V, b = self.Vt[self.d > 1 / FAINT].T, len(base.labels)
         if V.shape[1] == b:
@@ -147,7 +147,7 @@ class Seen(NamedTuple):
         return equations._replace(Z=Z)
 
 
-def seen_in(equations: Equations, base: Base, laws: Sequence[JointLaw]) -> Seen:
+def seen_in(equations: JointRows, base: Base, laws: Sequence[JointLaw]) -> Seen:
     """Compare the regressor with the noise of the torques, which is at least 1 % of a torque."""
     n, b = len(laws), len(base.labels)
     size = equations.by_joint(equations.tau, n)[equations.joint]
@@ -186,7 +186,7 @@ class Information:
 
 
 def information(
-    model: RobotModel, motions: Sequence[RobotMotion], base: Base, equations: Equations,
+    model: RobotModel, motions: Sequence[RobotMotion], base: Base, equations: JointRows,
     seen: Seen, rotors: bool,
 ) -> Information:  # fmt: skip
     """Return the combinations that are determined, and the joints to move, in words."""
@@ -251,7 +251,7 @@ class Estimated(NamedTuple):
         weights: weights of the rows relative to 1 / sigma^2, shape (rows,).
     """
 
-    equations: Equations
+    equations: JointRows
     x: Array
     A: Array
     residuals: Array
@@ -292,7 +292,7 @@ class Estimated(NamedTuple):
         return np.append(x[:count], rest)
 
 
-def estimate(equations: Equations, laws: Sequence[JointLaw], base: Base, method: str) -> Estimated:
+def estimate(equations: JointRows, laws: Sequence[JointLaw], base: Base, method: str) -> Estimated:
     """Return the estimate by one of `METHODS`."""
     n, tau = len(laws), equations.tau
     x = np.concatenate([base.values, np.zeros(n), coordinates(laws)])
@@ -327,7 +327,7 @@ def estimate(equations: Equations, laws: Sequence[JointLaw], base: Base, method:
     return Estimated(equations, x, columns, predicted - tau, sigma, weights)
 
 
-def _ends(equations: Equations, laws: Sequence[JointLaw], size: int) -> tuple[Array, Array, Array]:
+def _ends(equations: JointRows, laws: Sequence[JointLaw], size: int) -> tuple[Array, Array, Array]:
     """Return bounds of all values and of their steps; values of linear laws have none, (p,) each.
 
     Velocities of a law are near those of the record; levels are at most three times the torque.

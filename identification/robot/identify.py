@@ -16,9 +16,9 @@ from identification.robot.base import Base, base_of, consistent
 from identification.robot.dynamics import WHERE, RobotModel
 from identification.robot.estimate import (
     METHODS,
-    Equations,
     Estimated,
     Information,
+    JointRows,
     estimate,
     information,
     seen_in,
@@ -55,7 +55,7 @@ class _Prepared(NamedTuple):
     model: RobotModel
     base: Base
     motions: tuple[RobotMotion, ...]
-    equations: Equations
+    equations: JointRows
     laws: tuple[JointLaw, ...]
     rotors: bool
     information: Information
@@ -127,7 +127,7 @@ def identify_robot(
         held = f"last {HELD:.0%} of each record, predicted from the rest"
     else:
         others = motions(model, validation, filter or made.motions[0].filter)
-        errors = _errors(made, found.x, Equations.of(model, others, made.base, rotors))
+        errors = _errors(made, found.x, JointRows.of(model, others, made.base, rotors))
         held = f"{validation.name}, which did not enter the fit"
     pi, spins, x = _consistent(made, found, cover)
     training, physical = (_errors(made, values, equations) for values in (found.x, x))
@@ -170,7 +170,7 @@ def _prepared(
     model = RobotModel.read(urdf)
     moved = motions(model, data, filter)
     base = base_of(model, rotors)
-    equations = Equations.of(model, moved, base, rotors)
+    equations = JointRows.of(model, moved, base, rotors)
     speeds = np.sqrt(np.mean(np.vstack([one.v for one in moved]) ** 2, axis=0))
     usual, laws = laws_of(model, USUAL, speeds), laws_of(model, law, speeds)
     seen = seen_in(equations, base, usual)
@@ -182,7 +182,7 @@ def _prepared(
 
 
 def _started(
-    model: RobotModel, equations: Equations, base: Base, usual: Sequence[JointLaw],
+    model: RobotModel, equations: JointRows, base: Base, usual: Sequence[JointLaw],
     laws: Sequence[JointLaw],
 ) -> tuple[JointLaw, ...]:  # fmt: skip
     """Return nonlinear laws fitted to the friction that the usual law leaves at each joint."""
@@ -266,7 +266,7 @@ def _check_signs(made: _Prepared, found: Estimated, cover: Sandwich, method: str
         )
 
 
-def _early(equations: Equations) -> NDArray[np.bool_]:
+def _early(equations: JointRows) -> NDArray[np.bool_]:
     """Return a mask of the rows of the first part of every record."""
     early = np.zeros(equations.tau.size, dtype=np.bool_)
     for record in np.unique(equations.record):
@@ -276,7 +276,7 @@ def _early(equations: Equations) -> NDArray[np.bool_]:
     return early
 
 
-def _errors(made: _Prepared, x: Array, equations: Equations) -> dict[str, TorqueError]:
+def _errors(made: _Prepared, x: Array, equations: JointRows) -> dict[str, TorqueError]:
     """Return the errors of the torques predicted by the values x, by joint."""
     n = len(made.laws)
     left = equations.linearised(made.laws, x)[1] - equations.tau
@@ -350,7 +350,7 @@ def _rotors_missing(
     if made.rotors or max(error.percent for error in training.values()) < POOR:
         return
     base = base_of(made.model, rotors=True)
-    equations = Equations.of(made.model, made.motions, base, rotors=True)
+    equations = JointRows.of(made.model, made.motions, base, rotors=True)
     after = estimate(equations, made.laws, base, method)
     if found.unlikely - after.unlikely > BETTER * equations.tau.size / len(made.laws):
         yield "Rotor inertias explain part of the errors: pass rotors=True (--rotors)."
@@ -358,7 +358,7 @@ def _rotors_missing(
 
 def _series(made: _Prepared, found: Estimated) -> tuple[TorqueSeries, ...]:
     """Return the torques of all rows, also of those that did not enter the fit."""
-    every = Equations.of(made.model, made.motions, made.base, made.rotors, every=True)
+    every = JointRows.of(made.model, made.motions, made.base, made.rotors, every=True)
     predicted, b = every.linearised(made.laws, found.x)[1], len(made.base.labels)
     rigid, series = every.Z[:, :b] @ found.x[:b], list[TorqueSeries]()
     for record, one in enumerate(made.motions):

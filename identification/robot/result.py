@@ -16,7 +16,7 @@ from identification.robot.dynamics import RobotModel, inertial_of, updated_urdf
 from identification.robot.estimate import Information
 from symfric.foundation import checks
 from symfric.foundation.files import read_json, write_text
-from symfric.foundation.shown import Showing, Shown, Table, columns, counted
+from symfric.foundation.shown import Showing, Shown, TextTable, columns, counted
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -129,7 +129,7 @@ class RobotFit(Showing):
         lines = (*self.information.sentences, f"Error of the torques: {self.held}.")
         return Shown(
             f"robot '{self.name}': {counted(len(self.joints), 'joint')}, law {laws}",
-            lines, Table(header, tuple(rows)), self.findings,
+            lines, TextTable(header, tuple(rows)), self.findings,
         )  # fmt: skip
 
     def __str__(self) -> str:

@@ -24,7 +24,7 @@ import numpy as np
 
 from identification.data.record import runs
 from identification.starts.measured import Measured
-from identification.starts.stribeck import Array, Curve, StribeckCurve, binned, samples
+from identification.starts.stribeck import Array, BinnedForce, StribeckCurve, binned, samples
 from symfric.foundation import checks
 from symfric.laws.static.exponential import SteadyStateLuGre
 
@@ -41,7 +41,7 @@ LEAST = 4
 
 @final
 @dataclass(frozen=True)
-class Step:
+class ProcedureStep:
     """Step of the procedure with number, meaning, number of points used, and values."""
 
     number: int
@@ -71,11 +71,11 @@ class SixSteps:
         doubts: messages on undetermined values, one sentence each.
     """
 
-    steps: tuple[Step, ...]
+    steps: tuple[ProcedureStep, ...]
     values: dict[str, float]
     errors: dict[str, float]
     rms: float
-    curve: Curve
+    curve: BinnedForce
     doubts: tuple[str, ...]
 
     @property
@@ -160,7 +160,7 @@ def six_steps(v: Array, F: Array, *, unstable: float = 0.0) -> SixSteps:
         error, errors = F_C + sigma_2 * speed - force, {name: np.inf for name in NAMES}
         doubts = [_no_fall(curve, top, low), *_of_line(curve, low)]
     rms = 100 * float(np.sqrt(np.mean(error**2)) / force.mean())
-    numbered = tuple(Step(number, *step) for number, step in enumerate(steps, start=1))
+    numbered = tuple(ProcedureStep(number, *step) for number, step in enumerate(steps, start=1))
     return SixSteps(numbered, values, errors, rms, curve, tuple(doubts))
 
 
@@ -187,7 +187,7 @@ def standard_errors(curve: StribeckCurve, speed: Array, noise: float) -> dict[st
 
 
 def _exponential(
-    curve: Curve, top: int, low: int, F_S: float, F_C: float, sigma_2: float
+    curve: BinnedForce, top: int, low: int, F_S: float, F_C: float, sigma_2: float
 ) -> tuple[Array, Array]:
     """Return speeds and -log of the remaining share of F_S - F_C, where this is significant."""
     speed = curve.v[top : low + 1]
@@ -214,7 +214,9 @@ def _exponents(speed: Array, power: Array) -> tuple[float, float, float]:
     return float(gaussian), float(np.exp(-middle / delta)), delta
 
 
-def _doubts(found: StribeckCurve, curve: Curve, low: int, count: int, unstable: float) -> list[str]:
+def _doubts(
+    found: StribeckCurve, curve: BinnedForce, low: int, count: int, unstable: float
+) -> list[str]:
     """Return messages on values that the shape of the curve does not determine."""
     messages = list[str]()
     v_s, slowest, fastest = found.v_s, float(curve.v[0]), float(curve.v[-1])
@@ -237,7 +239,7 @@ def _doubts(found: StribeckCurve, curve: Curve, low: int, count: int, unstable: 
     return messages
 
 
-def _of_line(curve: Curve, low: int) -> list[str]:
+def _of_line(curve: BinnedForce, low: int) -> list[str]:
     """Return messages on the linear part, which begins at the smallest force."""
     if low == curve.v.size - 1:
         return ["the force falls up to the fastest point: no linear part, sigma_2 is set to 0"]
@@ -246,7 +248,7 @@ def _of_line(curve: Curve, low: int) -> list[str]:
     return []
 
 
-def _no_fall(curve: Curve, top: int, low: int) -> str:
+def _no_fall(curve: BinnedForce, top: int, low: int) -> str:
     """Return the message that no point shows the fall of friction, so v_s and delta are unknown."""
     F, v = curve.F, curve.v
     if top == low:

@@ -35,7 +35,7 @@ STEPS = 40
 
 @final
 @dataclass(frozen=True, eq=False)
-class Elements:
+class SlipElements:
     """Maxwell-slip elements in the order in which they slip.
 
     Attributes:
@@ -94,7 +94,7 @@ def fit_elements(
     viscous: bool = True,
     offset: bool = True,
     most: int = MOST,
-) -> Elements:
+) -> SlipElements:
     """Fit `count` elements, or fewer if they explain the data equally well, by least squares.
 
     Args:
@@ -130,7 +130,7 @@ def fit_elements(
             "the sliding velocity"
         )
 
-    def improved(start: Array) -> Elements:
+    def improved(start: Array) -> SlipElements:
         return _improved(used, others, start, (viscous, offset, loaded))
 
     more = improved(_quantiles(radii, k, count + SPARE))
@@ -187,7 +187,7 @@ def _quantiles(radii: Array, k: Array, count: int) -> Array:
     return np.unique(np.maximum.accumulate(found * (1 + 1e-6 * np.arange(count))))
 
 
-def _merged(elements: Elements, count: int) -> Array:
+def _merged(elements: SlipElements, count: int) -> Array:
     """Return `count` radii after merging the neighbours that change the virgin curve least."""
     k, levels = elements.k, elements.levels
     while k.size > count:
@@ -203,7 +203,7 @@ def _merged(elements: Elements, count: int) -> Array:
 
 def _improved(
     measured: Measured, others: Array, radii: Array, kinds: tuple[bool, bool, int]
-) -> Elements:
+) -> SlipElements:
     """Refine stiffnesses, log radii and the other coefficients by a trust-region method."""
     from scipy.optimize import least_squares  # noqa: PLC0415 (slow to import)
 
@@ -239,4 +239,6 @@ def _improved(
     kept = k * radii > 1e-6 * float(k @ radii)
     shift = float(rest[-2] - rest[-1]) if offset else 0.0
     rms = left / float(np.sqrt(measured.F.size))
-    return Elements(k[kept], radii[kept], float(rest[0]) if viscous else 0.0, shift, loaded, rms)
+    return SlipElements(
+        k[kept], radii[kept], float(rest[0]) if viscous else 0.0, shift, loaded, rms
+    )

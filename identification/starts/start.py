@@ -8,9 +8,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from identification.starts.maxwell_slip import Elements, fit_elements
+from identification.starts.maxwell_slip import SlipElements, fit_elements
 from identification.starts.measured import Array, Hysteresis, Measured, hysteresis, travelled
-from identification.starts.stribeck import BINS, Curve, StribeckCurve, binned, fit_curve, fit_law
+from identification.starts.stribeck import (
+    BINS,
+    BinnedForce,
+    StribeckCurve,
+    binned,
+    fit_curve,
+    fit_law,
+)
 from identification.unknowns.roles import Natural, orders, parts, velocity
 from identification.unknowns.subject import Subject
 from symfric.foundation import checks
@@ -45,7 +52,7 @@ class Facts(NamedTuple):
     """
 
     stribeck: StribeckCurve
-    curve: Curve
+    curve: BinnedForce
     friction: Measured
     reversals: Hysteresis | None
     m: float
@@ -359,7 +366,7 @@ def carrying(law: Law, values: Mapping[str, float]) -> dict[str, float]:
     return {n: at[n] * (1 + max(missing, 0.0) / carried) for n in free}
 
 
-def _as_many(elements: Elements, count: int) -> tuple[Array, Array]:
+def _as_many(elements: SlipElements, count: int) -> tuple[Array, Array]:
     """Return stiffnesses and levels of `count` elements; the strongest ones are split if needed."""
     levels, radii = elements.levels, elements.radii
     while levels.size < count:

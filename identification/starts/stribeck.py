@@ -30,7 +30,7 @@ EXPONENTS = (0.5, 1.0, 2.0, 4.0)
 
 @final
 @dataclass(frozen=True, eq=False)
-class Curve:
+class BinnedForce:
     """Force as a function of velocity in bins, sorted by velocity.
 
     Attributes:
@@ -64,7 +64,7 @@ def samples(where: str, v: object, F: object) -> tuple[Array, Array]:
     return speed, force
 
 
-def binned(v: Array, F: Array, *, bins: int = BINS, slowest: float = SLOWEST) -> Curve:
+def binned(v: Array, F: Array, *, bins: int = BINS, slowest: float = SLOWEST) -> BinnedForce:
     """Return medians over logarithmically spaced bins of speed, separately for each direction.
 
     Points at few velocities, such as a staircase, are grouped by velocity instead. A median is not
@@ -89,7 +89,7 @@ def binned(v: Array, F: Array, *, bins: int = BINS, slowest: float = SLOWEST) ->
     groups = _by_speed(speed, bins, fastest) if levels.size > 4 * bins else []
     groups = groups or [speed == level for level in levels]
     found = np.array([_median(speed[g], force[g]) for g in groups]).reshape(-1, 4)
-    return Curve(*found[np.argsort(found[:, 0], kind="stable")].T)
+    return BinnedForce(*found[np.argsort(found[:, 0], kind="stable")].T)
 
 
 def _by_speed(v: Array, bins: int, fastest: float) -> list[NDArray[np.bool_]]:
@@ -136,7 +136,7 @@ class StribeckCurve:
         return np.sign(v) * level + self.sigma_2 * v
 
 
-def fit_curve(curve: Curve, *, delta: float | None = None) -> StribeckCurve:
+def fit_curve(curve: BinnedForce, *, delta: float | None = None) -> StribeckCurve:
     """Fit a Stribeck curve to the bins by least squares with equal weights.
 
     For each of 24 Stribeck velocities (and exponents .5, 1, 2, 4 unless `delta` is given), the
@@ -172,14 +172,14 @@ def fit_curve(curve: Curve, *, delta: float | None = None) -> StribeckCurve:
     return StribeckCurve(w[0] + w[1], w[0], float(v_s), float(best), w[2], offset, float(rms))
 
 
-def _columns(curve: Curve, v_s: float, delta: float) -> Array:
+def _columns(curve: BinnedForce, v_s: float, delta: float) -> Array:
     side, speed = np.sign(curve.v), np.abs(curve.v)
     offset = np.full(speed.size, 1.0 if curve.both else 0.0)
     falling = np.exp(-((speed / v_s) ** delta))
     return np.column_stack([side, side * falling, curve.v / speed.max(), offset, -offset])
 
 
-def _levels(curve: Curve, v_s: float, delta: float) -> tuple[list[float], float]:
+def _levels(curve: BinnedForce, v_s: float, delta: float) -> tuple[list[float], float]:
     """Return F_C, F_S - F_C, sigma_2 and both parts of the offset, and the norm of the error."""
     from scipy.optimize import nnls  # noqa: PLC0415 (slow to import)
 
@@ -203,7 +203,7 @@ WIDE = 10.0
 
 
 def fit_law(
-    law: Law, names: Sequence[str], points: Curve, N: float, guess: Mapping[str, float]
+    law: Law, names: Sequence[str], points: BinnedForce, N: float, guess: Mapping[str, float]
 ) -> dict[str, float]:
     """Return the parameters of the steady curve with the smallest sum of squares over the bins.
 
@@ -249,7 +249,9 @@ class _LawFit:
         strict: (high, low): velocities p[high] > p[low].
     """
 
-    def __init__(self, law: Law, names: Sequence[str], points: Curve, N: float, p: Array) -> None:
+    def __init__(
+        self, law: Law, names: Sequence[str], points: BinnedForce, N: float, p: Array
+    ) -> None:
         known, speed = parameters(law), np.abs(points.v)
         self.known, self.start = [known[n] for n in names], p
         self.F, self.size = points.F, float(np.abs(points.F).max()) or 1.0

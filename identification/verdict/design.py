@@ -27,7 +27,7 @@ from symfric.foundation.variable import starts_of
 from symfric.model import Model, Output, check_model
 
 
-class Motion(Protocol):
+class NamedSignals(Protocol):
     """Signals by name, such as those of a trajectory."""
 
     def __getitem__(self, name: str, /) -> Any:
@@ -113,7 +113,7 @@ def informative(
     )  # fmt: skip
 
 
-def expected_errors(free: Sequence[str], motion: Motion) -> dict[str, float]:
+def expected_errors(free: Sequence[str], motion: NamedSignals) -> dict[str, float]:
     """Return the smallest relative standard errors of the parameters after a motion.
 
     Args:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ocp.checking.resimulate import Arc
-from ocp.transcription.blocks import Array, Block, Entries, Indices, Piece
+from ocp.transcription.blocks import Array, Entries, Indices, Piece, RowBlock
 from ocp.transcription.program import Iterate, cost_weight
 from ocp.transcription.schemes import Coefficients, Radau
 from ocp.transcription.transcribe import Transcription
@@ -91,7 +91,7 @@ def _collocated(transcription: Transcription, w: Array, values: Array, number: i
 
 
 def _newton_step(
-    block: Block, implicit: tuple[int, int], scheme: Coefficients, start: Array, motion: Array,
+    block: RowBlock, implicit: tuple[int, int], scheme: Coefficients, start: Array, motion: Array,
     v: Array, theta: Array,
 ) -> Array:  # fmt: skip
     """Return the change of states and algebraic variables at all points, (nx + nz, N, D).
@@ -319,7 +319,7 @@ def _slopes(transcription: Transcription, iterate: Iterate, number: int) -> tupl
     return H_u.reshape(shape), H_uu.reshape(shape)
 
 
-def _equations(transcription: Transcription, number: int) -> tuple[Piece, Block] | None:
+def _equations(transcription: Transcription, number: int) -> tuple[Piece, RowBlock] | None:
     """Return the equations of a phase at collocation points, and their block."""
     for piece in transcription.skeleton.pieces:
         if piece.span == number and any(n.startswith("the equation of") for n in piece.names):

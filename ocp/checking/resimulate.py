@@ -14,7 +14,7 @@ from numpy.polynomial import legendre
 
 from ocp.formulation.phase import Array, Span, clipped
 from ocp.formulation.problem import Problem
-from ocp.transcription.unknowns import Points
+from ocp.transcription.unknowns import Values
 from symfric.foundation.variable import stacked
 from symfric.integrator import Hold, simulate
 from symfric.results.trajectory import Trajectory
@@ -83,7 +83,7 @@ class Arc:
         return {v.name: clipped(float(x), (v.lower, v.upper)) for v, x in pairs}
 
 
-def arcs_of(problem: Problem, meshes: Sequence[Array], points: Points) -> tuple[Arc, ...]:
+def arcs_of(problem: Problem, meshes: Sequence[Array], points: Values) -> tuple[Arc, ...]:
     """Return the arcs of a solver's result, in the order of `problem.spans`."""
     arcs: list[Arc] = []
     every = enumerate(zip(problem.spans, meshes, points.spans, strict=True))
@@ -96,7 +96,7 @@ def arcs_of(problem: Problem, meshes: Sequence[Array], points: Points) -> tuple[
     return tuple(arcs)
 
 
-class Run(NamedTuple):
+class SimulatedArc(NamedTuple):
     """Simulated motion of an arc, or of a part of an arc.
 
     Attributes:
@@ -184,8 +184,8 @@ class Run(NamedTuple):
 def resimulated(
     arcs: Sequence[Arc],
     rtol: float = RTOL,
-    follow: Callable[[Arc, Mapping[str, float]], Run | None] | None = None,
-) -> tuple[Run, ...]:
+    follow: Callable[[Arc, Mapping[str, float]], SimulatedArc | None] | None = None,
+) -> tuple[SimulatedArc, ...]:
     """Simulate the models under the optimised controls, which are constant on each interval.
 
     A phase starts at the simulated end of the previous one, according to its links. States without
@@ -195,7 +195,7 @@ def resimulated(
     `follow` returns the run of an arc from given start values, or None if it fails. By default it
     simulates the user's model.
     """
-    runs: list[Run] = []
+    runs: list[SimulatedArc] = []
     for arc in arcs:
         start, links = arc.state(0), arc.span.links
         if arc.span.phase:
@@ -209,7 +209,7 @@ def resimulated(
     return tuple(runs)
 
 
-def run_from(arc: Arc, node: int, start: Mapping[str, float], rtol: float = RTOL) -> Run:
+def run_from(arc: Arc, node: int, start: Mapping[str, float], rtol: float = RTOL) -> SimulatedArc:
     """Simulate the model from a node to the end of the arc."""
     times, model = arc.times[node:], arc.span.model
     u = {v.name: Hold(times[:-1], row[node:]) for v, row in zip(model.u, arc.u, strict=True)}
@@ -218,4 +218,4 @@ def run_from(arc: Arc, node: int, start: Mapping[str, float], rtol: float = RTOL
         model, end, t_start=begin, x0=dict(start), u=u, p=arc.parameters(), rtol=rtol,
         times=times[1:-1], throw=False,
     )  # fmt: skip
-    return Run(arc, trajectory, end)
+    return SimulatedArc(arc, trajectory, end)

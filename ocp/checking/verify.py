@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ocp.checking.interval_errors import local_errors
-from ocp.checking.resimulate import RTOL, Arc, Run, arcs_of, resimulated, run_from
+from ocp.checking.resimulate import RTOL, Arc, SimulatedArc, arcs_of, resimulated, run_from
 from ocp.formulation.phase import FREE, Array, Box, Row, fixed, size_of
 from ocp.formulation.problem import Problem
 from ocp.solving.solution import Solution
@@ -40,7 +40,7 @@ def _miss(
     return Miss(what, name, float(time), float(value), float(wanted), float(size), unit)
 
 
-def _at_nodes(run: Run) -> Iterator[Miss]:
+def _at_nodes(run: SimulatedArc) -> Iterator[Miss]:
     """Yield the misses of states and rows at the start, the via points and the end of a phase.
 
     Inputs and algebraic variables in rows are those of the preceding interval.
@@ -63,7 +63,7 @@ def _at_nodes(run: Run) -> Iterator[Miss]:
             yield _miss(what, row.name, time, value, (row.lower, row.upper), size)
 
 
-def _against_optimised(run: Run) -> Iterator[Miss]:
+def _against_optimised(run: SimulatedArc) -> Iterator[Miss]:
     """Yield the differences of states that are not prescribed from their optimised end values."""
     arc, model = run.arc, run.arc.span.model
     node = int(np.argmin(np.abs(arc.times - run.end)))
@@ -95,7 +95,7 @@ class _Kept(NamedTuple):
         outside = np.maximum(values - self.box[1], self.box[0] - values)
         return np.where(np.isnan(outside), np.inf, outside)
 
-    def magnitude(self, run: Run, times: Array) -> float:
+    def magnitude(self, run: SimulatedArc, times: Array) -> float:
         """Return the largest magnitude of the bounds and of the values at `times`, or `least`.
 
         The magnitude of a product is that of its factors.
@@ -120,7 +120,7 @@ def _kept(arc: Arc, *, peaks: bool) -> list[_Kept]:
     return bounds + [_Kept.of(row) for row in span.path if peaks or not row.is_peak]
 
 
-def _between_nodes(runs: Sequence[Run]) -> Iterator[Miss]:
+def _between_nodes(runs: Sequence[SimulatedArc]) -> Iterator[Miss]:
     """Yield the worst violation of each bound and path condition in the runs of one arc."""
     for kept in _kept(runs[0].arc, peaks=False):
         size = max(kept.magnitude(run, run.looks) for run in runs)
@@ -128,7 +128,7 @@ def _between_nodes(runs: Sequence[Run]) -> Iterator[Miss]:
         yield _miss(kept.kind, kept.name, *worst[1:], kept.box, size, kept.unit)
 
 
-def _worst(run: Run, kept: _Kept) -> tuple[float, float, float]:
+def _worst(run: SimulatedArc, kept: _Kept) -> tuple[float, float, float]:
     """Return the worst violation of a range, its time and its value, refined between steps."""
     looks = run.looks
     values = run.of(kept.expression, looks)[0]
@@ -146,7 +146,7 @@ def _worst(run: Run, kept: _Kept) -> tuple[float, float, float]:
     return best
 
 
-def left_between(run: Run, tolerance: float) -> NDArray[np.bool_]:
+def left_between(run: SimulatedArc, tolerance: float) -> NDArray[np.bool_]:
     """Return a mask (N,) of intervals that violate a bound or path condition by > `tolerance`."""
     mask = np.zeros(run.arc.intervals, dtype=bool)
     looks = run.looks
@@ -158,7 +158,7 @@ def left_between(run: Run, tolerance: float) -> NDArray[np.bool_]:
     return mask
 
 
-def _joined(before: Run, after: Run) -> Iterator[Miss]:
+def _joined(before: SimulatedArc, after: SimulatedArc) -> Iterator[Miss]:
     """Yield the misses of joins between the end of a phase and the start of the next one."""
     for join in after.arc.span.joins:
         value = float(
@@ -169,7 +169,7 @@ def _joined(before: Run, after: Run) -> Iterator[Miss]:
         yield _miss("joint", join.name, before.end, value, box, size)
 
 
-def _periodic(problem: Problem, first: Run, last: Run) -> Iterator[Miss]:
+def _periodic(problem: Problem, first: SimulatedArc, last: SimulatedArc) -> Iterator[Miss]:
     """Yield the differences of periodic states between the end and the start."""
     model = first.arc.span.model
     for v, size in zip(model.x, first.arc.sizes, strict=True):
@@ -233,7 +233,7 @@ def verified_arcs(
 ) -> Verification:  # fmt: skip
     """Verify optimised arcs whose optimised cost is `cost`; see `verify`."""
 
-    def judged(runs: Sequence[Run], errors: tuple[Array, ...]) -> Verification:
+    def judged(runs: Sequence[SimulatedArc], errors: tuple[Array, ...]) -> Verification:
         """Return the verification of the arcs by `runs`, which are in the order of time."""
         bad = next((run.trajectory for run in runs if not run.ok), None)
         checked, value = [*misses_of(problem, runs)], float("nan")
@@ -268,7 +268,7 @@ def verified_arcs(
     return replace(found, restarted=judged(runs, errors), restarts=restarts, growth=growth)
 
 
-def _drifts(runs: Sequence[Run]) -> tuple[Array, ...]:
+def _drifts(runs: Sequence[SimulatedArc]) -> tuple[Array, ...]:
     """Return the relative change of the distance from the optimised motion over each interval.
 
     It is the local error up to the growth of errors over one interval, and requires no simulation
@@ -282,7 +282,9 @@ def _drifts(runs: Sequence[Run]) -> tuple[Array, ...]:
     return tuple(found)
 
 
-def misses_of(problem: Problem, runs: Sequence[Run], *, optimised: bool = True) -> Iterator[Miss]:
+def misses_of(
+    problem: Problem, runs: Sequence[SimulatedArc], *, optimised: bool = True
+) -> Iterator[Miss]:
     """Yield the misses of all conditions, and of optimised end values if `optimised`."""
     for _, of_arc in groupby(runs, lambda run: run.arc.number):
         yield from _between_nodes(list(of_arc))
@@ -300,7 +302,7 @@ def misses_of(problem: Problem, runs: Sequence[Run], *, optimised: bool = True) 
             yield from _periodic(problem, first, last[-1])
 
 
-def cost_of(problem: Problem, runs: Sequence[Run]) -> float:
+def cost_of(problem: Problem, runs: Sequence[SimulatedArc]) -> float:
     """Return J of the simulated motion: sum, or mean or largest value of the scenarios."""
     shares: dict[int, float] = {}
     for run in runs:
@@ -320,7 +322,7 @@ def cost_of(problem: Problem, runs: Sequence[Run]) -> float:
     return sum(values) / (len(values) if problem.kind == "mean" else 1)
 
 
-def _above_largest(runs: Sequence[Run]) -> Iterator[tuple[int, float]]:
+def _above_largest(runs: Sequence[SimulatedArc]) -> Iterator[tuple[int, float]]:
     """Yield (scenario, difference of a cost `largest` from the state that bounds its values)."""
     values: dict[tuple[int, str], list[float]] = {}
     weights: dict[tuple[int, str], float] = {}
@@ -337,13 +339,13 @@ def _above_largest(runs: Sequence[Run]) -> Iterator[tuple[int, float]]:
 
 def restarted(
     arcs: Sequence[Arc], tolerance: float, rtol: float = RTOL
-) -> tuple[tuple[Run, ...], tuple[float, ...]]:
+) -> tuple[tuple[SimulatedArc, ...], tuple[float, ...]]:
     """Simulate with restarts at optimised nodes where the motion departs from the optimised one.
 
     Returns:
         The runs and the times of restarts; both are empty if single intervals do not agree.
     """
-    runs: list[Run] = []
+    runs: list[SimulatedArc] = []
     restarts: list[float] = []
     for arc in arcs:
         node = 0
@@ -359,7 +361,7 @@ def restarted(
     return tuple(runs), tuple(restarts)
 
 
-def _departs(run: Run, node: int, tolerance: float) -> int:
+def _departs(run: SimulatedArc, node: int, tolerance: float) -> int:
     """Return the last node up to which the run is near the optimised states."""
     arc = run.arc
     times = arc.times[node:][arc.times[node:] <= run.trajectory.span[1]]

@@ -21,7 +21,7 @@ from ocp.solving.prepared import Option
 from ocp.solving.solution import Solution
 from ocp.transcription.program import Iterate, SolverStatistics
 from ocp.transcription.transcribe import Discretisation, discretise
-from ocp.transcription.unknowns import Points, SpanPoints
+from ocp.transcription.unknowns import SpanPoints, Values
 from symfric.foundation.parameters import Variable
 from symfric.foundation.variable import stacked
 
@@ -237,7 +237,7 @@ def reassemble(
         own, arcs = arcs[:count], arcs[count:]
         spans.append(_span_points(span, own))
         meshes.append(_mesh(problem, number, legs, [(p.T, mesh) for _, p, mesh in own]))
-    points = Points(tuple(spans), solved.points.chosen)
+    points = Values(tuple(spans), solved.points.chosen)
     (motion,) = motions_of(problem, meshes, t.scheme.coefficients(), points)
     detailed = solved.known.motion  # contains stiction as reactions
     if motion.t.size == detailed.t.size:

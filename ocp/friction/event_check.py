@@ -22,7 +22,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ocp.checking.resimulate import Arc, Run, arcs_of, resimulated
+from ocp.checking.resimulate import Arc, SimulatedArc, arcs_of, resimulated
 from ocp.checking.verify import cost_of, misses_of
 from ocp.formulation.phase import Array
 from ocp.friction import sequence
@@ -78,7 +78,9 @@ class SetValued:
         found: dict[str, tuple[Mode, ...]] = {}
         for name in self.contacts:
             pairs = zip(middles[f"{name}_mode"], pairwise(edges.tolist()), strict=True)
-            found[name] = sequence.modes_of([sequence.Run(round(m), *ends) for m, ends in pairs])
+            found[name] = sequence.modes_of(
+                [sequence.ModeInterval(round(m), *ends) for m, ends in pairs]
+            )
         return found
 
     @property
@@ -214,7 +216,7 @@ def verify_exactly(solution: Solution, tolerance: float = 1e-4, rtol: float = 1e
     problem = solution.problem
     failures: list[str] = []
 
-    def follow(arc: Arc, start: Mapping[str, float]) -> Run | None:
+    def follow(arc: Arc, start: Mapping[str, float]) -> SimulatedArc | None:
         rows = zip(arc.span.model.u, arc.u, strict=True)
         try:
             motion = set_valued(
@@ -226,7 +228,7 @@ def verify_exactly(solution: Solution, tolerance: float = 1e-4, rtol: float = 1e
         except SolveError as error:
             failures.append(str(error))
             return None
-        return Run(arc, motion.trajectory, float(arc.times[-1]))
+        return SimulatedArc(arc, motion.trajectory, float(arc.times[-1]))
 
     runs = resimulated(arcs_of(problem, solution.meshes, solution.points), follow=follow)
     checked, value = list(misses_of(problem, runs, optimised=False)), float("nan")

@@ -35,9 +35,9 @@ from ocp.friction.smooth_models import Scales, same_size, scales_of, widths_at
 from ocp.solving.motion import span_motions
 from ocp.solving.one_solve import (
     STARTS,
+    HomotopyStep,
     Solver,
     Starts,
-    Step,
     Task,
     finalists,
     least,
@@ -50,7 +50,7 @@ from ocp.solving.starts import Start, resample, start_of
 from ocp.transcription.program import SolverStatistics
 from ocp.transcription.schemes import make_meshes
 from ocp.transcription.transcribe import Transcription, discretise
-from ocp.transcription.unknowns import Points
+from ocp.transcription.unknowns import Values
 
 FIRST = 0.3
 """Smoothing width of the first solves, in multiples of the largest sliding velocity."""
@@ -187,7 +187,7 @@ class _Path:
         self.spent: list[SolverStatistics] = []
         self.prepared: dict[tuple[int, str], tuple[Solver, Prepared]] = {}
 
-    def coarse(self, guess: Start, starts: int) -> list[Step]:
+    def coarse(self, guess: Start, starts: int) -> list[HomotopyStep]:
         """Return coarse solves with wide layers that lead to different motions, the best first."""
         coarse = self.discretisation.on(_meshes(self.problem, COARSE))
         begin = coarse.unpack(start_of(coarse, guess)[0].w)
@@ -217,7 +217,7 @@ class _Path:
                 steps += self.each(coarse, tries[len(steps) :])
         return finalists(steps)
 
-    def faster(self, steps: Sequence[Step]) -> bool:
+    def faster(self, steps: Sequence[HomotopyStep]) -> bool:
         """Return True if the best motion so far is much faster than the scales.
 
         Layers are then too narrow for all starts, and lead to many iterations and poor motions.
@@ -227,7 +227,7 @@ class _Path:
         faster = (scale.speed > SAME * self.scales[name].speed for name, scale in found.items())
         return best.good and any(faster)
 
-    def rivals(self, coarse: Sequence[Step]) -> tuple[Sharp, ...]:
+    def rivals(self, coarse: Sequence[HomotopyStep]) -> tuple[Sharp, ...]:
         """Return the motions of coarse solves with narrower layers on the same mesh.
 
         There are none if the layers of the laws are wide, or with several contacts, whose sequences
@@ -254,7 +254,7 @@ class _Path:
                 found.append(self.sharp(step, steady=False))
         return tuple(found)
 
-    def first(self, coarse: Sequence[Step], intervals: int) -> Step:
+    def first(self, coarse: Sequence[HomotopyStep], intervals: int) -> HomotopyStep:
         """Return the best of several coarse solves, solved again on the finer mesh."""
         if coarse[0].ended:
             return coarse[0]
@@ -266,15 +266,15 @@ class _Path:
         self.scales = now if same_size(now, self.scales, SAME) else self.scales
         return self.refined(step, np.inf) if step.good else step
 
-    def scales_at(self, step: Step) -> Scales:
+    def scales_at(self, step: HomotopyStep) -> Scales:
         """Return the scales of the motion of a step."""
         return scales_of(self.user, self.problem, step.points, self.scales)
 
     def each(
-        self, mesh: Transcription, tries: Sequence[Points],
+        self, mesh: Transcription, tries: Sequence[Values],
         options: Mapping[str, Option] = EARLY,
-        until: Callable[[Sequence[Step]], bool] | None = None,
-    ) -> list[Step]:  # fmt: skip
+        until: Callable[[Sequence[HomotopyStep]], bool] | None = None,
+    ) -> list[HomotopyStep]:  # fmt: skip
         """Solve with the widest layers from each start, until a solve is stopped or `until` holds.
 
         Equal motions of several starts do not end the search, as they may be a poor local optimum:
@@ -283,7 +283,7 @@ class _Path:
         stages = [f"start {number}" for number in range(1, len(tries) + 1)]
         return self.solves(mesh, tries, FIRST, options, stages, until)
 
-    def narrower(self, before: Step, level: float) -> Step:
+    def narrower(self, before: HomotopyStep, level: float) -> HomotopyStep:
         """Solve with the smaller width `level`, and refine the mesh for it.
 
         A step is not accepted if its cost exceeds the Lagrangian of the previous motion at this
@@ -303,7 +303,7 @@ class _Path:
             return replace(step, accepted=False)
         return self.refined(step, limit)
 
-    def refined(self, step: Step, limit: float) -> Step:
+    def refined(self, step: HomotopyStep, limit: float) -> HomotopyStep:
         """Return `step` on a mesh refined until errors are permitted or a limit is reached."""
         step = self.with_errors(step)
         for _ in range(PASSES - 1):
@@ -326,19 +326,19 @@ class _Path:
     def solve(
         self,
         transcription: Transcription,
-        points: Points,
+        points: Values,
         level: float,
         options: Mapping[str, Option],
         stage: str,
-    ) -> Step:
+    ) -> HomotopyStep:
         """Solve once with the smoothing width `level`."""
         return self.solves(transcription, [points], level, options, [stage])[0]
 
     def solves(
-        self, transcription: Transcription, tries: Sequence[Points], level: float,
+        self, transcription: Transcription, tries: Sequence[Values], level: float,
         options: Mapping[str, Option], stages: Sequence[str],
-        until: Callable[[Sequence[Step]], bool] | None = None,
-    ) -> list[Step]:  # fmt: skip
+        until: Callable[[Sequence[HomotopyStep]], bool] | None = None,
+    ) -> list[HomotopyStep]:  # fmt: skip
         """Solve from several starts with the smoothing width `level`; see `each`."""
         values = transcription.values(widths_at(self.user, self.scales, level))
         if self.problem.kind == "worst":
@@ -348,21 +348,21 @@ class _Path:
             solver = self.task.solver.with_defaults(**options)
             self.prepared[key] = solver, solver.prepared(transcription.program)
         starts = Starts(transcription, *self.prepared[key], values)
-        steps: list[Step] = []
+        steps: list[HomotopyStep] = []
         for outcome in starts.outcomes(tries, self.task.supervisor, stages):
             self.spent.append(outcome.statistics)
-            steps.append(Step(transcription, outcome, values, level))
+            steps.append(HomotopyStep(transcription, outcome, values, level))
             if until is not None and until(steps):
                 break
         return steps
 
-    def moved(self, step: Step, into: Transcription) -> Points:
+    def moved(self, step: HomotopyStep, into: Transcription) -> Values:
         """Return the motion of a step interpolated to the meshes of `into`."""
         meshes, points = step.transcription.meshes, step.points
         spans = span_motions(self.problem, self.task.scheme, meshes, points)
         return resample(into, spans, points.chosen)
 
-    def with_errors(self, step: Step) -> Step:
+    def with_errors(self, step: HomotopyStep) -> HomotopyStep:
         """Return `step` with the local errors of its intervals."""
         widths = widths_at(self.user, self.scales, step.level)
         arcs = [*arcs_of(self.problem, step.transcription.meshes, step.points)]
@@ -373,7 +373,7 @@ class _Path:
         worst = max((float(e.max()) for e in errors), default=0.0)
         return replace(step, error=worst, errors=errors)
 
-    def sharp(self, step: Step, steady: bool) -> Sharp:
+    def sharp(self, step: HomotopyStep, steady: bool) -> Sharp:
         """Return a step as a solution of the problem with its widths."""
         widths = widths_at(self.user, self.scales, step.level)
         problem = replace(self.problem, p=dict(self.problem.p) | widths)

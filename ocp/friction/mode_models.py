@@ -55,7 +55,7 @@ NEWTON_STEPS = 2
 except near 0."""
 
 
-class Loop(NamedTuple):
+class ContactLoop(NamedTuple):
     """Contacts of a loop or of one coordinate, which stick together.
 
     Attributes:
@@ -81,7 +81,7 @@ class Loop(NamedTuple):
         return sum((g * value for g, value in pairs), start=ca.SX(0))
 
 
-def loops_of(model: Model) -> tuple[Loop, ...]:
+def loops_of(model: Model) -> tuple[ContactLoop, ...]:
     """Return the loops, or coordinates outside loops, of a mechanism with several contacts."""
     mechanics = model.holonomic
     if mechanics is None or ca.depends_on(mechanics.phi, model.t):
@@ -89,7 +89,7 @@ def loops_of(model: Model) -> tuple[Loop, ...]:
     q, qd = model.vector("x")[: mechanics.n], model.vector("x")[mechanics.n : 2 * mechanics.n]
     slopes = [(c, ca.jacobian(c.slip, qd)) for c in sticking(model)]
     J = ca.jacobian(mechanics.phi, q)
-    loops: list[Loop] = []
+    loops: list[ContactLoop] = []
     for columns, rows in paths_of(J):
         if len(columns) != len(rows) + 1 or len(columns) > MINORS:
             continue
@@ -101,7 +101,7 @@ def loops_of(model: Model) -> tuple[Loop, ...]:
         ]
         if len(members) > 1:
             contacts, along = zip(*members, strict=True)
-            loops.append(Loop(contacts, along, tangent))
+            loops.append(ContactLoop(contacts, along, tangent))
     return tuple(loops)
 
 
@@ -176,9 +176,9 @@ def _in_modes(model: Model, modes: Mapping[str, int]) -> Model:
     return rebuilt(made, outputs={**made.outputs, **outputs})
 
 
-def _sticking_loops(model: Model, modes: Mapping[str, int]) -> list[Loop]:
+def _sticking_loops(model: Model, modes: Mapping[str, int]) -> list[ContactLoop]:
     """Return the loops whose contacts stick; raise ValueError if only some of them stick."""
-    loops: list[Loop] = []
+    loops: list[ContactLoop] = []
     for loop in loops_of(model):
         resting = [c.name for c in loop.members if not modes[c.name]]
         if resting and len(resting) < len(loop.members):

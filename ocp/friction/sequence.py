@@ -1,7 +1,7 @@
 """Mode sequences: slip directions and stick of contacts over time.
 
-A contact slips forwards (+1), sticks (0) or slips backwards (-1). A `Run` is an interval with one
-mode of a contact, and a `Track` consists of its runs in order. An `Arc` is an interval with
+A contact slips forwards (+1), sticks (0) or slips backwards (-1). A `ModeInterval` has one mode of
+a contact, and a `Track` consists of its runs in order. An `Arc` is an interval with
 constant modes of all contacts. Ends of phases and via points, whose times are given by the user,
 divide the motion into `Leg`s of arcs with free durations.
 """
@@ -25,7 +25,7 @@ KINDS = {1: "slip+", 0: "stick", -1: "slip-"}
 """Name of each mode."""
 
 
-class Run(NamedTuple):
+class ModeInterval(NamedTuple):
     """Interval from `begin` to `end` [s] with one mode of a contact: +1 and -1 slip, 0 stick."""
 
     mode: int
@@ -37,7 +37,7 @@ class Track(NamedTuple):
     """Consecutive runs of one contact, which may exist only in a part of the motion."""
 
     contact: str
-    runs: tuple[Run, ...]
+    runs: tuple[ModeInterval, ...]
 
     def at(self, t: float) -> int | None:
         """Return the mode at a time, or None if the contact does not exist at this time."""
@@ -99,7 +99,10 @@ def read(contact: str, t: Array, slip: Array, creep: float, shortest: float) -> 
     modes = np.where(np.abs(slip) < creep, 0, np.sign(slip)).astype(int)
     first = np.flatnonzero(np.append(True, np.diff(modes) != 0))
     last = np.append(first[1:] - 1, t.size - 1)
-    runs = [Run(int(modes[a]), float(t[a]), float(t[b])) for a, b in zip(first, last, strict=True)]
+    runs = [
+        ModeInterval(int(modes[a]), float(t[a]), float(t[b]))
+        for a, b in zip(first, last, strict=True)
+    ]
     crossing = creep * np.diff(t) / np.maximum(np.abs(np.diff(slip)), SLOWEST * creep)
     crossing = np.concatenate([[0.0], crossing, [0.0]])
     spent = np.where([run.mode == 0 for run in runs], crossing[first] + crossing[last + 1], 0.0)
@@ -107,7 +110,9 @@ def read(contact: str, t: Array, slip: Array, creep: float, shortest: float) -> 
     kept = list(_merged(long or [max(runs, key=lambda run: run.end - run.begin)]))
     middles = [(a.end + b.begin) / 2 for a, b in pairwise(kept)]
     bounds = pairwise([float(t[0]), *middles, float(t[-1])])
-    return Track(contact, tuple(Run(run.mode, *ab) for run, ab in zip(kept, bounds, strict=True)))
+    return Track(
+        contact, tuple(ModeInterval(run.mode, *ab) for run, ab in zip(kept, bounds, strict=True))
+    )
 
 
 def with_rests(
@@ -128,22 +133,22 @@ def with_rests(
         width: duration of the stick intervals [s].
         ends: True if the contact sticks at the start, and at the end.
     """
-    runs: list[Run] = []
+    runs: list[ModeInterval] = []
     for run in track.runs:
         if runs and runs[-1].mode * run.mode < 0 and can_rest(run.begin):
             half = min(width, run.end - run.begin, runs[-1].end - runs[-1].begin) / 2
             runs[-1] = runs[-1]._replace(end=run.begin - half)
-            runs.append(Run(0, run.begin - half, run.begin + half))
+            runs.append(ModeInterval(0, run.begin - half, run.begin + half))
             run = run._replace(begin=run.begin + half)
         runs.append(run)
     first = runs[0]
     if ends[0] and first.mode and can_rest(first.begin):
         after = first.begin + min(width, first.end - first.begin) / 2
-        runs[0:1] = [Run(0, first.begin, after), first._replace(begin=after)]
+        runs[0:1] = [ModeInterval(0, first.begin, after), first._replace(begin=after)]
     last = runs[-1]
     if ends[1] and last.mode and can_rest(last.end):
         before = last.end - min(width, last.end - last.begin) / 2
-        runs[-1:] = [last._replace(end=before), Run(0, before, last.end)]
+        runs[-1:] = [last._replace(end=before), ModeInterval(0, before, last.end)]
     return track._replace(runs=tuple(runs))
 
 
@@ -210,16 +215,16 @@ def inserted(legs: Legs, number: int, contact: str, mode: int, begin: float, end
     raise IndexError(number)
 
 
-def tracks_of(legs: Legs) -> dict[str, list[Run]]:
+def tracks_of(legs: Legs) -> dict[str, list[ModeInterval]]:
     """Return contact -> its runs over all legs."""
-    runs: dict[str, list[Run]] = {}
+    runs: dict[str, list[ModeInterval]] = {}
     for arc in flat(legs):
         for contact, mode in arc.modes.items():
-            runs.setdefault(contact, []).append(Run(mode, arc.begin, arc.end))
+            runs.setdefault(contact, []).append(ModeInterval(mode, arc.begin, arc.end))
     return {contact: _merged(own) for contact, own in runs.items()}
 
 
-def modes_of(runs: Sequence[Run]) -> tuple[Mode, ...]:
+def modes_of(runs: Sequence[ModeInterval]) -> tuple[Mode, ...]:
     """Return consecutive runs of one contact as modes of a solution."""
     merged = _merged(runs)
     return tuple(Mode(KINDS[run.mode], *run[1:]) for run in merged if run.end > run.begin)
@@ -235,9 +240,9 @@ def shown(legs: Legs) -> str:
     return " | ".join("".join(sign(s.modes) for s in leg.arcs) for leg in legs)
 
 
-def _merged(runs: Sequence[Run]) -> list[Run]:
+def _merged(runs: Sequence[ModeInterval]) -> list[ModeInterval]:
     """Return `runs` with neighbours of equal mode merged."""
-    merged: list[Run] = []
+    merged: list[ModeInterval] = []
     for run in runs:
         if merged and merged[-1].mode == run.mode:
             merged[-1] = merged[-1]._replace(end=run.end)

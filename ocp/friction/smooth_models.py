@@ -11,7 +11,7 @@ import numpy as np
 from ocp.formulation.phase import Array, Chain
 from ocp.formulation.problem import Problem
 from ocp.solving.one_solve import along_points
-from ocp.transcription.unknowns import Points
+from ocp.transcription.unknowns import Values
 from symfric.foundation import checks
 from symfric.foundation.numeric import tanh
 from symfric.foundation.parameters import Variable, parameters, with_values
@@ -214,7 +214,7 @@ def smoothed(problem: Problem) -> Problem:
     return replace(problem, phases=Chain(phases))
 
 
-def scales_of(problem: Problem, smooth: Problem, points: Points, before: Scales) -> Scales:
+def scales_of(problem: Problem, smooth: Problem, points: Values, before: Scales) -> Scales:
     """Return the scales of the motion `points`, at least `LEAST` times the previous ones.
 
     Normal forces that depend on the friction force of another contact are omitted.

@@ -17,9 +17,9 @@ from ocp.friction.arcs import LEFT
 from ocp.friction.mode_models import SIDES, excess, mode_model, newton
 from ocp.friction.sequence import Arc, Leg, Legs, Track, cut, read, with_rests
 from ocp.friction.smooth_models import sticking
-from ocp.solving.motion import Motion
+from ocp.solving.motion import ScenarioMotion
 from ocp.transcription.transcribe import Transcription
-from ocp.transcription.unknowns import Points, SpanPoints
+from ocp.transcription.unknowns import SpanPoints, Values
 from symfric.model import Model
 
 SHORT_RUN = 5e-3
@@ -37,12 +37,12 @@ class Known(NamedTuple):
         chosen: values of the chosen parameters by name.
     """
 
-    motion: Motion
+    motion: ScenarioMotion
     p: Mapping[str, float]
     chosen: Mapping[str, float]
 
     @staticmethod
-    def of(problem: Problem, motion: Motion, chosen: Mapping[str, float]) -> "Known":
+    def of(problem: Problem, motion: ScenarioMotion, chosen: Mapping[str, float]) -> "Known":
         """Return the motion with the parameters of all models of `problem`."""
         p: dict[str, float] = {}
         for span in problem.spans:
@@ -77,7 +77,7 @@ class Known(NamedTuple):
         return function(t[None, :], *groups, np.tile(p[:, None], (1, t.size))).full()
 
 
-def points_in(into: Transcription, arcs: Sequence[Arc], known: Known) -> Points:
+def points_in(into: Transcription, arcs: Sequence[Arc], known: Known) -> Values:
     """Return initial points in which phase k of `into` follows the known motion during arc k.
 
     Algebraic variables are improved by one step of Newton's method.
@@ -102,7 +102,7 @@ def points_in(into: Transcription, arcs: Sequence[Arc], known: Known) -> Points:
             solved = step(t[None, :], x, z, held, p).full()
             z = np.where(np.isfinite(solved), solved, z)
         spans.append(SpanPoints(clipped(arc.duration, limits(span.T)), states(mesh), x, z, u))
-    return Points(tuple(spans), dict(known.chosen))
+    return Values(tuple(spans), dict(known.chosen))
 
 
 @final

@@ -9,7 +9,7 @@ import numpy as np
 
 from ocp.mpc.controller import GeneratedController, disturbed
 from ocp.mpc.session import Session
-from symfric.embedded import CORES, Absent, Measured, Tools, find_tools
+from symfric.embedded import CORES, Absent, BlockMeasurement, Tools, find_tools
 from symfric.embedded.measure import counted
 from symfric.embedded.target import Target
 from symfric.emitter.c99 import REALS
@@ -31,7 +31,7 @@ def measure_controller(
     scale: float = 0.1,
     flags: Sequence[str] = ("-O2",),
     tools: Tools | Absent | None = None,
-) -> Measured:
+) -> BlockMeasurement:
     """Cross-compile a controller, run it under QEMU, and count the instructions of each cycle.
 
     The cycles are those of a loop on the host with noise, references that jump and distant states
@@ -64,7 +64,7 @@ def measure_controller(
     checks.count(f"{where}: cycles", cycles, least=1, most=20_000)
     found, name = find_tools() if tools is None else tools, made.design.name
     if isinstance(found, Absent):
-        return Measured(name, made.real, core, status=f"skipped: {found.advice}")
+        return BlockMeasurement(name, made.real, core, status=f"skipped: {found.advice}")
     session, rows, expected = Session(made.design, real=REALS[made.real]), [], []
     for measured, data, action in disturbed(session, cycles, scale=scale, broken=False):
         rows.append(session.given(measured, data, made.design.settings.tolerance))
@@ -79,9 +79,9 @@ def measure_controller(
         )  # fmt: skip
     if instructions.max() > LONGEST / 2:  # the timer may have started again
         status = f"not measured: cycles of more than {LONGEST / 2e6:.0f} million instructions"
-        return Measured(name, made.real, core, status=status)
+        return BlockMeasurement(name, made.real, core, status=status)
     results = words["rows"].view(REALS[made.real].kind).reshape(controls.shape).astype(float)
-    return Measured(
+    return BlockMeasurement(
         name, made.real, core,
         average=float(instructions.mean()),
         maximum=float(round(instructions.max())),

@@ -34,7 +34,7 @@ RUIZ, ITERATIONS = 10, 6
 
 @final
 @dataclass(frozen=True, eq=False)
-class Equations:
+class KktEquations:
     """Equations with the Hessian H (n, n) of the Lagrangian and the Jacobian A (m, n)."""
 
     H: Sparse

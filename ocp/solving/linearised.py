@@ -24,9 +24,9 @@ import scipy.sparse as sp
 from ocp.formulation.expressions import offered
 from ocp.formulation.phase import Array, fixed
 from ocp.solving.active import BoundStatus, Condition, Entry, Sensitivity, entries, status_of
-from ocp.solving.equations import Equations
+from ocp.solving.equations import KktEquations
 from ocp.solving.methods import Ipopt
-from ocp.solving.motion import Motion, at_times
+from ocp.solving.motion import ScenarioMotion, at_times
 from ocp.solving.optimum import STATIONARY, Optimum, Sparse
 from ocp.transcription.blocks import Indices
 from ocp.transcription.program import Iterate, worst_of
@@ -138,10 +138,10 @@ class Linearised:
         return (upper + sp.triu(upper, 1).T) / self.optimum.size
 
     @cached_property
-    def equations(self) -> Equations:
+    def equations(self) -> KktEquations:
         """Linear equations in the free unknowns and the multipliers of the active rows."""
         active = sp.csr_matrix(self.optimum.rows[1])[self.held][:, self.free]
-        return Equations(self.hessian[self.free][:, self.free], active)
+        return KktEquations(self.hessian[self.free][:, self.free], active)
 
     def stepped(self) -> Optimum | None:
         """Return the optimum after a Newton step with these active conditions, None without one."""
@@ -281,7 +281,7 @@ class Linearised:
         moved[self.free] = np.nan if found is None else found[: self.free.size]
         return change, moved
 
-    def sensitivity(self, name: str, motion: Motion) -> Sensitivity:
+    def sensitivity(self, name: str, motion: ScenarioMotion) -> Sensitivity:
         """Return the derivatives by a parameter or a prescribed value, at times of `motion`."""
         change, moved = self.by(name)
         made, moved = self.optimum.transcription, moved * self.optimum.transcription.program.scale

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ocp.formulation.phase import Array, Span
 from ocp.formulation.problem import Posed, Problem
 from ocp.transcription.schemes import Coefficients, Scheme
-from ocp.transcription.unknowns import Points, SpanPoints
+from ocp.transcription.unknowns import SpanPoints, Values
 from symfric.foundation.files import json_data
 from symfric.foundation.parameters import check_names
 from symfric.foundation.storable import agree
@@ -46,7 +46,7 @@ class Stretch:
 
 @final
 @dataclass(frozen=True, eq=False, repr=False)
-class Motion:
+class ScenarioMotion:
     """Motion of one scenario.
 
     `motion["v"]` is a signal at the times `motion.t`.
@@ -118,8 +118,8 @@ class _Piece(NamedTuple):
 
 
 def motions_of(
-    problem: Problem, meshes: Sequence[Array], scheme: Coefficients, points: Points
-) -> tuple[Motion, ...]:
+    problem: Problem, meshes: Sequence[Array], scheme: Coefficients, points: Values
+) -> tuple[ScenarioMotion, ...]:
     """Return the motion of each scenario.
 
     Args:
@@ -137,8 +137,8 @@ def motions_of(
 
 def _motion(
     name: str, problem: Problem, numbers: Sequence[int], meshes: Sequence[Array],
-    scheme: Coefficients, points: Points,
-) -> Motion:  # fmt: skip
+    scheme: Coefficients, points: Values,
+) -> ScenarioMotion:  # fmt: skip
     spans, own = [problem.spans[k] for k in numbers], [points.spans[k] for k in numbers]
     pieces: list[_Piece] = []
     phases: list[Stretch] = []
@@ -157,7 +157,7 @@ def _motion(
         none = [np.full(p.edges.size - 1, np.nan) for p in pieces]
         return np.concatenate([p.controls.get(name, n) for p, n in zip(pieces, none, strict=True)])
 
-    return Motion(
+    return ScenarioMotion(
         name=name,
         t=several["t"],
         signals={name: several[name] for name in names},
@@ -187,7 +187,7 @@ def joined(
     }
 
 
-def at_times(motion: Motion, times: Array, series: Mapping[str, Array]) -> dict[str, Array]:
+def at_times(motion: ScenarioMotion, times: Array, series: Mapping[str, Array]) -> dict[str, Array]:
     """Return values by name, given at `times` that include those of `motion`, at its times."""
     if times.size == motion.t.size:
         return dict(series)
@@ -203,7 +203,7 @@ def _jumps(before: Span, old: SpanPoints, after: Span, new: SpanPoints) -> bool:
     return bool((gap > SAME * after.model.nominal("x")).any())
 
 
-class Sampled(NamedTuple):
+class PhaseValues(NamedTuple):
     """Values of a phase at its nodes and collocation points in the order of time.
 
     Attributes:
@@ -219,8 +219,8 @@ class Sampled(NamedTuple):
     u: Array
 
 
-def sampled(points: SpanPoints, mesh: Array, scheme: Coefficients) -> Sampled:
-    """Return the values of `points` at the times of a `Motion`."""
+def sampled(points: SpanPoints, mesh: Array, scheme: Coefficients) -> PhaseValues:
+    """Return the values of `points` at the times of a `ScenarioMotion`."""
     N, d = mesh.size - 1, scheme.degree
     inside = scheme.nodes[1:-1] if d and scheme.meets_end else scheme.nodes[1:]
     shown = inside.size
@@ -237,7 +237,7 @@ def sampled(points: SpanPoints, mesh: Array, scheme: Coefficients) -> Sampled:
         blocks = points.z.reshape(points.z.shape[0], N, d)
         z = np.column_stack([blocks[:, 0, 0], blocks @ scheme.inner_ends])
     at = np.arange(fractions.size + 1)
-    return Sampled(
+    return PhaseValues(
         np.append(fractions, 1.0),
         at % (shown + 1) == 0,
         together(points.nodes, points.inner),
@@ -325,7 +325,7 @@ class SpanMotion(NamedTuple):
 
 
 def span_motions(
-    problem: Problem | Posed, scheme: Scheme, meshes: Sequence[Array], points: Points
+    problem: Problem | Posed, scheme: Scheme, meshes: Sequence[Array], points: Values
 ) -> list[SpanMotion]:
     """Return the motions of all phases and scenarios."""
     nodes = scheme.coefficients().nodes

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from ocp.formulation.phase import Array
 from ocp.formulation.problem import Problem
-from ocp.solving.motion import Motion, motions_of
+from ocp.solving.motion import ScenarioMotion, motions_of
 from ocp.solving.starts import Start, start_of
 from ocp.transcription.schemes import Radau, Scheme, make_meshes
 from ocp.transcription.transcribe import Transcription, discretise
@@ -77,7 +77,7 @@ class Nlp:
         unknowns, rows = ([f"{p.name} {made.when(self.x0, p)}".strip() for p in g] for g in groups)
         return unknowns, rows
 
-    def motion(self, w: ArrayLike) -> Motion:
+    def motion(self, w: ArrayLike) -> ScenarioMotion:
         """Return the motion of the unknowns `w`, of the first scenario.
 
         Raises:

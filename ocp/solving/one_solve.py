@@ -23,7 +23,7 @@ from ocp.solving.watch import Progress, in_stage
 from ocp.transcription.program import Iterate, Outcome, SolverStatistics
 from ocp.transcription.schemes import Radau, Scheme
 from ocp.transcription.transcribe import Transcription
-from ocp.transcription.unknowns import Points, SpanPoints
+from ocp.transcription.unknowns import SpanPoints, Values
 from symfric.foundation import checks
 from symfric.foundation.executors import in_order
 from symfric.foundation.parameters import parameters
@@ -83,7 +83,7 @@ class Solved:
     outcome: Outcome
 
     @cached_property
-    def points(self) -> Points:
+    def points(self) -> Values:
         """Unknowns of the motion in SI units."""
         return self.transcription.unpack(self.outcome.iterate.w)
 
@@ -117,7 +117,7 @@ class Solved:
 
 @final
 @dataclass(frozen=True, eq=False)
-class Step(Solved):
+class HomotopyStep(Solved):
     """Solve with the smoothing width `level` and the `values` of all parameters.
 
     Attributes:
@@ -149,7 +149,7 @@ def rank(outcome: Outcome) -> tuple[bool, bool, float]:
     return not outcome.status.stopped, not ok, outcome.cost if ok else outcome.violation
 
 
-def least(steps: Sequence[Step]) -> Step:
+def least(steps: Sequence[HomotopyStep]) -> HomotopyStep:
     """Return the stopped step, or the cheapest one, or the least violated if none is solved."""
     return min(steps, key=lambda step: rank(step.outcome))
 
@@ -159,9 +159,9 @@ def same_cost(a: Outcome, b: Outcome) -> bool:
     return abs(a.cost - b.cost) <= ALIKE * abs(b.cost)
 
 
-def finalists(steps: Sequence[Step]) -> list[Step]:
+def finalists(steps: Sequence[HomotopyStep]) -> list[HomotopyStep]:
     """Return the best steps with different costs, which indicate different motions."""
-    kept: list[Step] = []
+    kept: list[HomotopyStep] = []
     for step in sorted(steps, key=lambda one: (not one.good, one.outcome.cost)):
         new = not any(same_cost(step.outcome, one.outcome) for one in kept)
         if not kept or (new and step.good and len(kept) < FINALISTS):
@@ -169,7 +169,7 @@ def finalists(steps: Sequence[Step]) -> list[Step]:
     return kept
 
 
-def narrow_widths(transcription: Transcription, points: Points) -> str:
+def narrow_widths(transcription: Transcription, points: Values) -> str:
     """Return a message about contacts with narrow smoothing widths, or "" if there are none.
 
     It names contacts that stick or reverse, and contacts whose widths smooth a quantity other than
@@ -239,7 +239,7 @@ class Starts:
         return self.run(w, Supervisor(left))
 
     def outcomes(
-        self, tries: Sequence[Points], supervisor: Supervisor, stages: Sequence[str]
+        self, tries: Sequence[Values], supervisor: Supervisor, stages: Sequence[str]
     ) -> Iterator[Outcome]:
         """Yield the outcomes in the order of `tries`; a stopped one is the last.
 
@@ -276,7 +276,7 @@ class Starts:
         finally:
             results.close()
 
-    def best(self, tries: Sequence[Points], supervisor: Supervisor) -> tuple[Outcome, str]:
+    def best(self, tries: Sequence[Values], supervisor: Supervisor) -> tuple[Outcome, str]:
         """Return the best outcome, with the statistics of all, and a sentence about the others."""
         stages = [f"start {number}" for number in range(1, len(tries) + 1)]
         found = [*self.outcomes(tries, supervisor, stages)]
@@ -307,8 +307,8 @@ class Starts:
 
 
 def starts_around(
-    into: Transcription, begin: Points, seeds: Iterable[int], spread: float = SPREAD
-) -> tuple[Points, ...]:
+    into: Transcription, begin: Values, seeds: Iterable[int], spread: float = SPREAD
+) -> tuple[Values, ...]:
     """Return `begin` for the seed 0, and `begin` with a random smooth deviation for other seeds.
 
     The deviation of a state is a sum of half waves over the whole motion, with amplitudes of
@@ -325,7 +325,7 @@ def starts_around(
     return tuple(_around(into, begin, spread, seed) if seed else begin for seed in seeds)
 
 
-def _around(into: Transcription, begin: Points, spread: float, seed: int) -> Points:
+def _around(into: Transcription, begin: Values, spread: float, seed: int) -> Values:
     problem, phases = into.problem, len(into.problem.chain)
     random = np.random.default_rng(seed)
     names = {v.name for s in problem.spans for group in (s.model.x, s.model.u) for v in group}
@@ -356,10 +356,10 @@ def _around(into: Transcription, begin: Points, spread: float, seed: int) -> Poi
             size = 0.25 * (high - low) if isfinite(low) and isfinite(high) else v.nominal
             row += size * np.sin(at) @ waves[v.name]
         spans.append(SpanPoints(old.T, nodes, points, old.z, u))
-    return Points(tuple(spans), begin.chosen)
+    return Values(tuple(spans), begin.chosen)
 
 
-def _ranges(into: Transcription, begin: Points) -> dict[str, float]:
+def _ranges(into: Transcription, begin: Values) -> dict[str, float]:
     """Return state -> range of its values in `begin`, over all phases.
 
     A constant state has the largest range of the states of its unit.

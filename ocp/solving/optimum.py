@@ -30,7 +30,7 @@ from ocp.solving.motion import along_points, joined, sampled
 from ocp.transcription.blocks import Piece
 from ocp.transcription.program import Iterate, cost_weight
 from ocp.transcription.transcribe import Transcription
-from ocp.transcription.unknowns import Points, SpanPoints
+from ocp.transcription.unknowns import SpanPoints, Values
 
 Sparse = Any
 """Sparse matrix of SciPy, which has no stubs."""
@@ -87,7 +87,7 @@ class Optimum:
         return float(np.abs(total).max() / max(terms.max(), 1e-300))
 
     @cached_property
-    def points(self) -> Points:
+    def points(self) -> Values:
         """Unknowns of the motion in SI units."""
         return self.transcription.unpack(self.iterate.w)
 

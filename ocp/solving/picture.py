@@ -15,7 +15,7 @@ from matplotlib.patches import Patch
 
 from ocp.formulation.phase import Span
 from ocp.solving.active import per_unit
-from ocp.solving.motion import Motion, Stretch
+from ocp.solving.motion import ScenarioMotion, Stretch
 from ocp.solving.solution import Solution
 from ocp.solving.watch import Progress
 from symfric.foundation import checks
@@ -52,7 +52,7 @@ class Drawn(NamedTuple):
     """
 
     label: str
-    motion: Motion
+    motion: ScenarioMotion
     runs: Sequence[Trajectory]
     ending: str
 
@@ -100,7 +100,7 @@ def plot_solutions(
     return plot_motions(drawn, list(names) or shared, spans, modes, path)
 
 
-def _with_costates(solution: Solution, names: Sequence[str]) -> tuple[Motion, ...]:
+def _with_costates(solution: Solution, names: Sequence[str]) -> tuple[ScenarioMotion, ...]:
     """Return the motions, or the first one with its costates if `names` contain some."""
     if not any(name.startswith(COSTATE) for name in names):
         return solution.motions

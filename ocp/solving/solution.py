@@ -12,12 +12,12 @@ import numpy as np
 from ocp.formulation.phase import Array, Free
 from ocp.formulation.problem import Posed, Problem, posed
 from ocp.solving.active import ActiveConditions, active_conditions, in_words
-from ocp.solving.motion import Motion, Stretch, at_times
+from ocp.solving.motion import ScenarioMotion, Stretch, at_times
 from ocp.solving.optimum import Optimum
 from ocp.solving.verification import Penalty, Verification, penalties_of
 from ocp.transcription.program import Iterate, SolverStatistics
 from ocp.transcription.schemes import Scheme
-from ocp.transcription.unknowns import Points
+from ocp.transcription.unknowns import Values
 from symfric.foundation import packed
 from symfric.foundation.files import json_data, write_table, write_text
 from symfric.foundation.parameters import check_names
@@ -80,12 +80,12 @@ class Solution(packed.Portable):
     status: Status
     message: str
     cost: float
-    motions: tuple[Motion, ...]
+    motions: tuple[ScenarioMotion, ...]
     chosen: Mapping[str, float]
     statistics: SolverStatistics
     scheme: Scheme
     meshes: tuple[Array, ...]
-    points: Points
+    points: Values
     iterate: Iterate
     modes: Mapping[str, tuple[Mode, ...]] = field(default_factory=dict[str, tuple[Mode, ...]])
     verification: Verification | None = None
@@ -155,7 +155,7 @@ class Solution(packed.Portable):
         return () if self.verification is None else tuple(self.verification.trajectories)
 
     @property
-    def scenarios(self) -> dict[str, Motion]:
+    def scenarios(self) -> dict[str, ScenarioMotion]:
         """Scenario -> motion; empty for a problem without scenarios."""
         return {motion.name: motion for motion in self.motions if motion.name}
 
@@ -166,12 +166,12 @@ class Solution(packed.Portable):
 
     @property
     def t(self) -> Array:
-        """Times of the signals [s], shape (n,); see `Motion`."""
+        """Times of the signals [s], shape (n,); see `ScenarioMotion`."""
         return self.motions[0].t
 
     @property
     def signals(self) -> dict[str, Array]:
-        """Name -> values, shape (n,); see `Motion`."""
+        """Name -> values, shape (n,); see `ScenarioMotion`."""
         return self.motions[0].signals
 
     @property

@@ -17,7 +17,7 @@ from ocp.solving.motion import SpanMotion, along, span_motions, structure_of
 from ocp.solving.solution import Solution
 from ocp.transcription.program import Iterate
 from ocp.transcription.transcribe import Transcription
-from ocp.transcription.unknowns import Points, SpanPoints
+from ocp.transcription.unknowns import SpanPoints, Values
 from symfric.foundation import checks
 from symfric.model import Model
 
@@ -26,7 +26,7 @@ Guess = float | ArrayLike | Callable[[Array], ArrayLike]
 
 
 @runtime_checkable
-class Run(Protocol):
+class SignalSource(Protocol):
     """Signals over time, such as a run of `simulate` or of a closed loop.
 
     Attributes:
@@ -41,7 +41,7 @@ class Run(Protocol):
     def signals(self) -> Mapping[str, Array]: ...  # noqa: D102
 
 
-Start = Mapping[str, Guess] | Solution | Run | Points | None
+Start = Mapping[str, Guess] | Solution | SignalSource | Values | None
 """Guesses by name, a solution of this or a similar problem, a run, points, or None."""
 
 
@@ -55,11 +55,11 @@ def start_of(into: Transcription, guess: Start) -> tuple[Iterate, bool]:
         ValueError: invalid guesses; see `initial_points`.
     """
     rows = into.program.g.numel()
-    if isinstance(guess, Points):
+    if isinstance(guess, Values):
         _check_shapes(into, guess)
         return Iterate.cold(into.pack(guess), rows), False
     if not isinstance(guess, Solution):
-        if guess is not None and not isinstance(guess, Mapping | Run):  # pyright: ignore[reportUnnecessaryIsInstance]
+        if guess is not None and not isinstance(guess, Mapping | SignalSource):  # pyright: ignore[reportUnnecessaryIsInstance]
             hint = "a file is read by ocp.load(path)" if isinstance(guess, str | Path) else ""
             what = "values by name, a solution, a run, or points"
             raise checks.refused("guess", what, guess, hint)
@@ -75,10 +75,10 @@ def start_of(into: Transcription, guess: Start) -> tuple[Iterate, bool]:
     return (replace(old, w=w), True) if same else (Iterate.cold(w, rows), False)
 
 
-def _check_shapes(into: Transcription, points: Points) -> None:
+def _check_shapes(into: Transcription, points: Values) -> None:
     """Raise ValueError if the shapes of `points` do not match the meshes and models."""
 
-    def shapes(of: Points) -> list[tuple[tuple[int, ...], ...]]:
+    def shapes(of: Values) -> list[tuple[tuple[int, ...], ...]]:
         return [tuple(a.shape for a in (s.nodes, s.inner, s.z, s.u)) for s in of.spans]
 
     fitting = initial_points(into)
@@ -91,7 +91,9 @@ def _check_shapes(into: Transcription, points: Points) -> None:
         )
 
 
-def initial_points(into: Transcription, given: Mapping[str, Guess] | Run | None = None) -> Points:
+def initial_points(
+    into: Transcription, given: Mapping[str, Guess] | SignalSource | None = None
+) -> Values:
     """Return initial points from `given` values by name, and default values for other signals.
 
     A run is stretched to the duration; free durations are scaled to its duration.
@@ -109,7 +111,9 @@ def initial_points(into: Transcription, given: Mapping[str, Guess] | Run | None 
     problem = into.problem
     models = [span.model for span in problem.spans]
     known = dict.fromkeys(v.name for m in models for group in (m.x, m.z, m.u) for v in group)
-    t, rows = _signals(given, known) if isinstance(given, Run) else (None, dict[str, Array]())
+    t, rows = (
+        _signals(given, known) if isinstance(given, SignalSource) else (None, dict[str, Array]())
+    )
     durations = _durations(problem, None if t is None else float(t[-1]))
     total = float(sum(durations[: len(problem.chain)]))
     if t is not None:
@@ -125,7 +129,7 @@ def initial_points(into: Transcription, given: Mapping[str, Guess] | Run | None 
     return into.consistent(points_from(into, durations, value))
 
 
-def _signals(run: Run, known: Collection[str]) -> tuple[Array, dict[str, Array]]:
+def _signals(run: SignalSource, known: Collection[str]) -> tuple[Array, dict[str, Array]]:
     """Return the times of a run since its start [s], and its signals among `known`."""
     t = checks.array("guess: times of the run", run.t)
     if t.size < 2 or np.diff(t).min() < 0.0 or t[0] == t[-1]:
@@ -140,7 +144,7 @@ def _signals(run: Run, known: Collection[str]) -> tuple[Array, dict[str, Array]]
 
 def resample(
     into: Transcription, spans: Sequence[SpanMotion], chosen: Mapping[str, float]
-) -> Points:
+) -> Values:
     """Return the motion of a solution on other meshes, phases or models with equal names.
 
     If the number of phases is equal, each phase is transferred separately. Otherwise the total
@@ -174,7 +178,7 @@ Value = Callable[[int, str, Array], Array | None]
 """(index of the phase, name, fractions of T) -> initial values of the signal, None if unknown."""
 
 
-def points_from(into: Transcription, durations: Sequence[float], value: Value) -> Points:
+def points_from(into: Transcription, durations: Sequence[float], value: Value) -> Values:
     """Return points of all phases from known values, with default values of other signals."""
     problem, phases = into.problem, len(into.problem.chain)
     points: list[SpanPoints] = []
@@ -208,7 +212,7 @@ def points_from(into: Transcription, durations: Sequence[float], value: Value) -
         u = rows([v.name for v in model.u], rest, (mesh[1:] + mesh[:-1]) / 2)
         nodes, points_inside = (table[:, np.searchsorted(at, part)] for part in (mesh, inner))
         points.append(SpanPoints(durations[number], nodes, points_inside, z, u))
-    return Points(tuple(points), {choice.name: choice.guess for choice in problem.chosen})
+    return Values(tuple(points), {choice.name: choice.guess for choice in problem.chosen})
 
 
 class _Lines:

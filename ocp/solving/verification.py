@@ -12,7 +12,7 @@ from ocp.formulation.phase import Array, Row, Span
 from ocp.formulation.problem import Posed, Problem
 from ocp.solving.motion import along_points
 from ocp.transcription.schemes import Scheme
-from ocp.transcription.unknowns import Points, SpanPoints
+from ocp.transcription.unknowns import SpanPoints, Values
 from symfric.foundation.files import json_data
 from symfric.foundation.shown import brief, spaced
 from symfric.foundation.status import Status
@@ -225,7 +225,7 @@ class Penalty:
 
 
 def penalties_of(
-    problem: Problem | Posed, scheme: Scheme, meshes: Sequence[Array], points: Points
+    problem: Problem | Posed, scheme: Scheme, meshes: Sequence[Array], points: Values
 ) -> dict[str, Penalty]:
     """Return condition -> its penalty at the collocation points, or at its time."""
     found: dict[str, Penalty] = {}
@@ -255,7 +255,7 @@ def _soft_rows(span: Span) -> list[tuple[float, Row]]:
 
 
 def largest_product(
-    problem: Problem | Posed, scheme: Scheme, meshes: Sequence[Array], points: Points
+    problem: Problem | Posed, scheme: Scheme, meshes: Sequence[Array], points: Values
 ) -> float:
     """Return the largest product of complementary signals, relative to its typical magnitude."""
     return max(
@@ -282,7 +282,7 @@ class _Phase(NamedTuple):
 
 
 def _phases(
-    problem: Problem | Posed, scheme: Scheme, meshes: Sequence[Array], points: Points
+    problem: Problem | Posed, scheme: Scheme, meshes: Sequence[Array], points: Values
 ) -> Iterator[_Phase]:
     made, begin = scheme.coefficients(), 0.0
     inside = made.nodes[1:] if made.degree else made.nodes

@@ -13,7 +13,7 @@ import casadi as ca
 import numpy as np
 
 from ocp.formulation.phase import Array
-from ocp.solving.motion import Motion, motions_of
+from ocp.solving.motion import ScenarioMotion, motions_of
 from ocp.transcription.program import Program, worst_of
 from ocp.transcription.transcribe import Transcription
 from symfric.foundation.status import Status
@@ -50,7 +50,7 @@ class Progress:
     transcription: Transcription | None = None
 
     @property
-    def motion(self) -> Motion:
+    def motion(self) -> ScenarioMotion:
         """Motion of the iterate in the first scenario, evaluated on each access.
 
         Its model is that of the current solve: with smooth friction, or the arcs of modes.

@@ -13,7 +13,7 @@ from typing import final
 import casadi as ca
 import numpy as np
 
-from ocp.transcription.blocks import Array, Block, Entries, Indices, Piece, Selection
+from ocp.transcription.blocks import Array, Entries, Indices, Piece, RowBlock, Selection
 
 Slot = tuple[float, int]
 """Target of the shares of one cost: its weight in the objective and -1, or, if a row bounds the
@@ -34,7 +34,7 @@ def assemble(
     n, m = w.numel(), sum(piece.at.size for piece in pieces)
     targets = [(weight, -1 if k < 0 else int(pieces[k].at[0, 0])) for weight, k in slots]
     parts = [
-        _Part(piece, piece.block, piece.selection, *targets[piece.slot], w)
+        _PlacedPiece(piece, piece.block, piece.selection, *targets[piece.slot], w)
         for piece in pieces
         if piece.block is not None and piece.selection is not None
     ]
@@ -84,7 +84,7 @@ def _joined(triplets: Sequence[Triplets]) -> Triplets:
 
 @final
 @dataclass(frozen=True, eq=False)
-class _Part:
+class _PlacedPiece:
     """Piece with a block.
 
     The share of the cost is added to the objective with the factor `weight`, and to row `bounded`
@@ -92,7 +92,7 @@ class _Part:
     """
 
     piece: Piece
-    block: Block
+    block: RowBlock
     selection: Selection
     weight: float
     bounded: int
@@ -163,7 +163,7 @@ class _Part:
 
 
 def _rows(
-    parts: Sequence[_Part], values: Sequence[ca.MX], constant: Triplets, w: ca.MX, m: int
+    parts: Sequence[_PlacedPiece], values: Sequence[ca.MX], constant: Triplets, w: ca.MX, m: int
 ) -> ca.MX:
     """Return g = A w plus the values of the blocks."""
     A = _constant(constant, (m, w.numel()))

@@ -2,7 +2,7 @@
 
     f(w) = c'w + sum_i q(S_i w, theta_i),    g(w) = A w + rows r(S_i w, theta_i)
 
-A `Block` is r and q with exact derivatives, built once and mapped over its places i. The S_i are
+A `RowBlock` is r and q with exact derivatives, built once and mapped over its places i. The S_i are
 constant and sparse, so the derivatives of the program are sums of derivatives of blocks:
 
     dg/dw = A + sum_i P_i' (dr/dv) S_i,    H = sum_i S_i' (d^2 (sigma q + lam'r) / dv^2) S_i
@@ -50,7 +50,7 @@ class Entries:
         return np.setdiff1d(np.arange(self.rows.size), self.varying)
 
 
-class Block(NamedTuple):
+class RowBlock(NamedTuple):
     """Rows r (m, 1) and a share q of the cost as functions of (v, theta), with derivatives.
 
     Attributes:
@@ -76,7 +76,7 @@ class Block(NamedTuple):
     of_hessian: Entries
 
 
-def block(name: str, v: Symbols, theta: Symbols, r: Symbols, q: Symbols | None = None) -> Block:
+def block(name: str, v: Symbols, theta: Symbols, r: Symbols, q: Symbols | None = None) -> RowBlock:
     """Return the block of rows `r` and a share `q` of the cost, differentiated by `v`."""
     kind = type(v)
     r = ca.densify(r)
@@ -90,7 +90,7 @@ def block(name: str, v: Symbols, theta: Symbols, r: Symbols, q: Symbols | None =
     def function(what: str, inputs: Sequence[Symbols], *outputs: Symbols) -> ca.Function:
         return ca.Function(f"{name}_{what}", list(inputs), list(outputs), OPTIONS)
 
-    return Block(
+    return RowBlock(
         n=v.numel(),
         m=r.numel(),
         rows=function("rows", arguments, r),
@@ -162,7 +162,7 @@ def select(parts: Sequence[Indices | tuple[Indices, Array]], places: int) -> Sel
     return Selection(np.concatenate(local), np.concatenate(columns).T, np.concatenate(weights).T)
 
 
-class Linear(NamedTuple):
+class ConstantEntries(NamedTuple):
     """Constant entries of the rows of a `Piece`, by place, row of the place, and column."""
 
     places: Indices
@@ -171,11 +171,13 @@ class Linear(NamedTuple):
     weights: Array
 
     @staticmethod
-    def of(rows: Indices, columns: Indices, weights: Array) -> "Linear":
+    def of(rows: Indices, columns: Indices, weights: Array) -> "ConstantEntries":
         """Return entries in the same `rows` (m,) of each place; others are (m, terms, places)."""
         m, terms, places = columns.shape
         at, factors = np.tile(np.arange(places), m * terms), np.broadcast_to(weights, columns.shape)
-        return Linear(at, np.repeat(rows, terms * places), columns.ravel(), factors.ravel())
+        return ConstantEntries(
+            at, np.repeat(rows, terms * places), columns.ravel(), factors.ravel()
+        )
 
 
 @final
@@ -235,10 +237,10 @@ class Piece:
     span: int
     interval: Indices
     offset: Array
-    block: Block | None = None
+    block: RowBlock | None = None
     selection: Selection | None = None
     theta: ca.MX = field(default_factory=lambda: ca.MX(0, 1))
-    linear: Linear | None = None
+    linear: ConstantEntries | None = None
     slot: int = 0
     at: Indices = field(default_factory=lambda: np.zeros((0, 0), np.int64))
 
@@ -286,7 +288,7 @@ def linear_piece(rows: Rows, columns: Indices, weights: Array, span: int, order:
         span=span,
         interval=np.zeros(1, np.int64),
         offset=np.zeros(1),
-        linear=Linear(
+        linear=ConstantEntries(
             0 * numbers[kept], numbers[kept], columns.ravel()[kept], weights.ravel()[kept]
         ),
     )

@@ -22,8 +22,8 @@ import casadi as ca
 import numpy as np
 
 from ocp.formulation.phase import Box, Span, fixed, initial, meet
-from ocp.transcription.blocks import Array, Block, Piece, Rows, block
-from ocp.transcription.unknowns import Grid, Local, SpanPoints
+from ocp.transcription.blocks import Array, Piece, RowBlock, Rows, block
+from ocp.transcription.unknowns import Grid, LocalUnknowns, SpanPoints
 from symfric.foundation.checks import listed
 from symfric.model.parts import Holonomic
 
@@ -172,10 +172,10 @@ class Closing(NamedTuple):
         known: fraction of T -> prescribed coordinates and rates there.
     """
 
-    local: Local
+    local: LocalUnknowns
     loops: Loops
-    correction: Block
-    levels: tuple[Block, Block]
+    correction: RowBlock
+    levels: tuple[RowBlock, RowBlock]
     known: Mapping[float, tuple[Known, Known]]
 
     @property
@@ -238,7 +238,7 @@ class Closing(NamedTuple):
 
 
 def closing(
-    local: Local,
+    local: LocalUnknowns,
     mechanics: Holonomic,
     before: Span | None,
     periodic: Sequence[str],

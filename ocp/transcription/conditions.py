@@ -12,15 +12,24 @@ import numpy as np
 
 from ocp.formulation.phase import Free, Row, Span, limits
 from ocp.formulation.problem import Problem
-from ocp.transcription.blocks import Array, Block, Indices, Piece, Rows, block, linear_piece, select
-from ocp.transcription.unknowns import Columns, Grid, Layout, Local, time_scale
+from ocp.transcription.blocks import (
+    Array,
+    Indices,
+    Piece,
+    RowBlock,
+    Rows,
+    block,
+    linear_piece,
+    select,
+)
+from ocp.transcription.unknowns import Columns, Grid, Layout, LocalUnknowns, time_scale
 from symfric.foundation.variable import stacked
 
 Maker = Callable[[Grid], Piece | None]
 """Function that returns the piece of a condition on a grid, or None if the grid has no place."""
 
 
-def at_nodes(local: Local) -> Iterator[Maker]:
+def at_nodes(local: LocalUnknowns) -> Iterator[Maker]:
     """Yield the conditions of a phase at its ends and via points, and its cost at the end."""
     span = local.span
     for fraction, rows in span.rows_at.items():
@@ -36,7 +45,7 @@ def at_nodes(local: Local) -> Iterator[Maker]:
 
 
 def _at_node(
-    local: Local, fraction: float, rows: Rows, made: Block, inside: bool, grid: Grid
+    local: LocalUnknowns, fraction: float, rows: Rows, made: RowBlock, inside: bool, grid: Grid
 ) -> Piece:
     """Return rows, or a share of the cost, at one node of a phase.
 
@@ -52,7 +61,7 @@ def _at_node(
 
 
 def _columns_at(
-    local: Local, grid: Grid, node: int, inside: bool
+    local: LocalUnknowns, grid: Grid, node: int, inside: bool
 ) -> tuple[int, tuple[Columns, Columns, Indices]]:
     """Return the interval and the columns of x, z and u at a node of the mesh.
 
@@ -78,7 +87,7 @@ def _sum(columns: Indices, weights: Array) -> Columns:
     return columns[:, kept, None], factors[:, :, None]
 
 
-def at_starts(local: Local, rows: Sequence[Row], first: int) -> Maker:
+def at_starts(local: LocalUnknowns, rows: Sequence[Row], first: int) -> Maker:
     """Return conditions at the starts of all intervals of a phase from the interval `first` on.
 
     Inputs are constant on intervals, so expressions with inputs jump there, and no collocation
@@ -111,13 +120,13 @@ def _knows_inside(span: Span, expression: ca.SX) -> bool:
     return bool(inside.numel()) and bool(ca.depends_on(expression, inside))
 
 
-def _node_block(local: Local, rows: ca.SX, share: ca.SX | None = None) -> Block:
+def _node_block(local: LocalUnknowns, rows: ca.SX, share: ca.SX | None = None) -> RowBlock:
     outputs = [rows, ca.SX(0) if share is None else share]
     r, q = ca.Function("at_node", local.span.symbols, outputs).call(local.values)
     return block("node", local.v, local.theta, r, None if share is None else q)
 
 
-def between(before: Local, after: Local) -> Iterator[Maker]:
+def between(before: LocalUnknowns, after: LocalUnknowns) -> Iterator[Maker]:
     """Yield links by expressions, and joins, between a phase and the previous one."""
     span = after.span
     v, theta = ca.vertcat(before.v, after.v), ca.vertcat(before.theta, after.theta)
@@ -139,7 +148,7 @@ def between(before: Local, after: Local) -> Iterator[Maker]:
 
 
 def _between(
-    before: Local, after: Local, made: Block, rows: Rows, inside: int, grid: Grid
+    before: LocalUnknowns, after: LocalUnknowns, made: RowBlock, rows: Rows, inside: int, grid: Grid
 ) -> Piece:
     """Return rows between the end of one phase and the start of the next one."""
     a, b, layout = before.number, after.number, grid.layout

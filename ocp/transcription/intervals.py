@@ -32,9 +32,18 @@ import numpy as np
 
 from ocp.formulation.changed_models import further_states, rebuilt
 from ocp.formulation.phase import Span
-from ocp.transcription.blocks import Array, Block, Indices, Linear, Piece, Rows, block, select
+from ocp.transcription.blocks import (
+    Array,
+    ConstantEntries,
+    Indices,
+    Piece,
+    RowBlock,
+    Rows,
+    block,
+    select,
+)
 from ocp.transcription.schemes import Shooting
-from ocp.transcription.unknowns import Grid, Local
+from ocp.transcription.unknowns import Grid, LocalUnknowns
 from symfric import integrator
 from symfric.foundation.parameters import Variable
 from symfric.foundation.programs import CompileError
@@ -60,7 +69,7 @@ class Engine:
         expected: predicted time [s] of the evaluations so far, which compiled code would reduce.
     """
 
-    block: Block
+    block: RowBlock
     expected: float = 0.0
 
     def __post_init__(self) -> None:
@@ -79,13 +88,13 @@ class Engine:
         return code.dump()
 
     @cached_property
-    def compiled(self) -> Block:
+    def compiled(self) -> RowBlock:
         """Block with compiled Functions."""
         path = str(library(self._prospect.written(), *self._prospect.names))
         functions = {name: ca.external(f.name(), path) for name, f in self._functions.items()}
         return self.block._replace(**functions)
 
-    def at(self, places: int) -> Block:
+    def at(self, places: int) -> RowBlock:
         """Return the block for a number of places per iteration, compiled if this saves time."""
         if "compiled" in self.__dict__:
             return self.compiled
@@ -115,13 +124,13 @@ class PointEquations(NamedTuple):
             is a local unknown.
     """
 
-    local: Local
+    local: LocalUnknowns
     engine: Engine
     rows: Rows
     sloped: Indices
 
 
-def point_equations(local: Local) -> PointEquations:
+def point_equations(local: LocalUnknowns) -> PointEquations:
     """Formulate the equations of a collocation point of a phase."""
     span, model, h = local.span, local.span.model, local.h
     conditions, penalised = (*span.path, *span.penalised), span.penalised
@@ -197,7 +206,7 @@ def piece_of_points(equations: PointEquations, grid: Grid) -> Piece:
         grid, equations.rows, equations.engine.at(N * d), columns, places,
         Piece.order_of(local.number, interval, 2 + j), weights=scheme.weights[j],
         extra=[*([(carrying[velocities], factors)] if velocities.size else []), slacks],
-        linear=Linear.of(equations.sloped[known], carrying[known], -slopes),
+        linear=ConstantEntries.of(equations.sloped[known], carrying[known], -slopes),
     )  # fmt: skip
 
 
@@ -214,7 +223,7 @@ def gaps(number: int, span: Span, grid: Grid) -> Piece:
         span=number,
         interval=interval,
         offset=np.ones(own.intervals),
-        linear=Linear.of(np.arange(len(names)), columns, weights),
+        linear=ConstantEntries.of(np.arange(len(names)), columns, weights),
     )
 
 
@@ -233,12 +242,12 @@ class Shot(NamedTuple):
             those of the next interval.
     """
 
-    local: Local
-    block: Block
-    paths: tuple[tuple[bool, Rows, Block], ...]
+    local: LocalUnknowns
+    block: RowBlock
+    paths: tuple[tuple[bool, Rows, RowBlock], ...]
 
 
-def shot(local: Local, scheme: Shooting) -> Shot:
+def shot(local: LocalUnknowns, scheme: Shooting) -> Shot:
     """Formulate the equations of an interval of a phase.
 
     Raises:
@@ -261,7 +270,7 @@ def shot(local: Local, scheme: Shooting) -> Shot:
     return Shot(local, _interval_block(interval), tuple(_paths(local)))
 
 
-def _interval_block(interval: ca.Function) -> Block:
+def _interval_block(interval: ca.Function) -> RowBlock:
     """Return the block as an expanded expression, or with calls of steps if it is too long."""
     flat = interval.expand()
     function, kind = (flat, ca.SX) if flat.n_instructions() <= LARGEST else (interval, ca.MX)
@@ -316,7 +325,7 @@ def _check(span: Span) -> None:
         )
 
 
-def _paths(local: Local) -> Iterator[tuple[bool, Rows, Block]]:
+def _paths(local: LocalUnknowns) -> Iterator[tuple[bool, Rows, RowBlock]]:
     """Yield the path conditions without inputs, then those with inputs; see `Shot`."""
     span, u = local.span, local.span.model.vector("u")
     knows = [bool(u.numel()) and bool(ca.depends_on(row.expression, u)) for row in span.path]

@@ -26,7 +26,7 @@ from ocp.transcription.conditions import Maker
 from ocp.transcription.intervals import PointEquations, Shot
 from ocp.transcription.program import Place, Program, Stages, bounds_of, stages_of
 from ocp.transcription.schemes import Scheme, Shooting, nodes_of
-from ocp.transcription.unknowns import Grid, Layout, Local, Points, SpanPoints
+from ocp.transcription.unknowns import Grid, Layout, LocalUnknowns, SpanPoints, Values
 from symfric.foundation import packed
 from symfric.foundation.parameters import check_names
 
@@ -157,7 +157,7 @@ def discretise(
     joined: list[Maker] = []
     for number, span in enumerate(problem.spans):
         earlier = tuple((i, problem.spans[i]) for i in range(number - span.phase, number))
-        local = Local(number, span, earlier, choices, not isinstance(scheme, Shooting))
+        local = LocalUnknowns(number, span, earlier, choices, not isinstance(scheme, Shooting))
         # scenarios differ only in values of parameters
         key = (span.phase, id(span.model), id(span.running), id(span.path))
         if key not in made:
@@ -275,7 +275,7 @@ class Transcription(packed.Portable):
         """Places of the unknowns in w."""
         return self.skeleton.layout
 
-    def pack(self, points: Points) -> Array:
+    def pack(self, points: Values) -> Array:
         """Return the vector w of `points`; shared unknowns take values of the first scenario."""
         w = np.zeros(self.layout.size)
         for span, own in zip(points.spans[::-1], self.layout.spans[::-1], strict=True):
@@ -297,7 +297,7 @@ class Transcription(packed.Portable):
             w[self.layout.largest] = g[self.skeleton.largest].max()
         return w
 
-    def unpack(self, w: ArrayLike) -> Points:
+    def unpack(self, w: ArrayLike) -> Values:
         """Return the points of the vector `w` in SI units."""
         values = np.asarray(w, dtype=float).ravel() * self.program.scale
         spans = tuple(
@@ -308,9 +308,9 @@ class Transcription(packed.Portable):
             for span, own in zip(self.problem.spans, self.layout.spans, strict=True)
         )
         names = [choice.name for choice in self.problem.chosen]
-        return Points(spans, dict(zip(names, values[self.layout.chosen].tolist(), strict=True)))
+        return Values(spans, dict(zip(names, values[self.layout.chosen].tolist(), strict=True)))
 
-    def consistent(self, points: Points) -> Points:
+    def consistent(self, points: Values) -> Values:
         """Return `points` with coordinates and rates of mechanisms moved onto their constraints."""
         spans = [
             span if loops is None else loops.consistent(span, mesh, self.inner_fractions(number))

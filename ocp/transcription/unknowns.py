@@ -10,7 +10,7 @@ import numpy as np
 
 from ocp.formulation.phase import Box, Free, Span, initial
 from ocp.formulation.problem import Problem
-from ocp.transcription.blocks import Array, Block, Indices, Linear, Piece, Rows, select
+from ocp.transcription.blocks import Array, ConstantEntries, Indices, Piece, RowBlock, Rows, select
 from ocp.transcription.schemes import Coefficients
 from symfric.foundation.variable import stacked
 
@@ -37,7 +37,7 @@ class SpanPoints:
 
 @final
 @dataclass(frozen=True, eq=False)
-class Points:
+class Values:
     """Values of all unknowns.
 
     Attributes:
@@ -194,7 +194,7 @@ class Data(NamedTuple):
     mesh: ca.MX
 
     def theta(self, interval: Indices, offset: Array, weights: Array | None = None) -> ca.MX:
-        """Return theta of `Local` at the fractions `offset` of each `interval`, (k, places).
+        """Return theta of `LocalUnknowns` at fractions `offset` of each `interval`, (k, places).
 
         `weights` are quadrature weights for an interval of length 1, by default zeros.
         """
@@ -243,7 +243,7 @@ Columns = Indices | tuple[Indices, Array]
 
 @final
 @dataclass(frozen=True, eq=False)
-class Local:
+class LocalUnknowns:
     """Local unknowns v and parameters theta of a phase at one time, as SX symbols.
 
         v = (x, z, u, T if free, free time before, chosen p),  scaled except the time before
@@ -347,14 +347,14 @@ class Local:
         self,
         grid: Grid,
         rows: Rows,
-        made: Block,
+        made: RowBlock,
         columns: tuple[Columns, Columns, Indices],
         at: tuple[Indices, Array],
         order: Indices,
         *,
         extra: Sequence[Columns] = (),
         weights: Array | None = None,
-        linear: Linear | None = None,
+        linear: ConstantEntries | None = None,
     ) -> Piece:
         """Return the piece of a block of these local unknowns.
 

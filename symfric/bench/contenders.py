@@ -25,7 +25,7 @@ from symfric.integrator.compiled.compiler import library
 from symfric.integrator.equations.initial import consistent, first_guess, first_step, smallest_step
 from symfric.integrator.equations.inputs import InputData, input_data
 from symfric.integrator.equations.system import System, system
-from symfric.integrator.methods.attempt import Given, State
+from symfric.integrator.methods.attempt import Given, SRow
 from symfric.integrator.prepared import chosen
 from symfric.integrator.running.events import Stop
 from symfric.integrator.running.integrator import Integrator
@@ -78,7 +78,7 @@ def loop(model: Model, times: Array, watched: Watched, rtol: float) -> Contender
     begin = _beginning(model, whole)
 
     def solve(**start: float) -> tuple[Array, Callable[[], int]]:
-        work.S[:] = State.at(0.0, first_step(end), begin(**start))
+        work.S[:] = SRow.at(0.0, first_step(end), begin(**start))
         work.R[:] = Given.of(end, rtol, end, 0.1 * rtol * whole.nominal, inputs.values[:, 0])
         outputs, steps, reason = Outputs.at(times, whole.n), 0, Stop.FULL
         work.loop.h_min = smallest_step(end)
@@ -88,7 +88,7 @@ def loop(model: Model, times: Array, watched: Watched, rtol: float) -> Contender
             records, _, reason = engine.march(work, ATTEMPTS["compiled"])
             steps += records.shape[0]
         if reason is not Stop.END:
-            raise RuntimeError(f"the step became too small at t = {work.S[State.T]:g} s")
+            raise RuntimeError(f"the step became too small at t = {work.S[SRow.T]:g} s")
         return outputs.values[rows], lambda: steps
 
     solve()

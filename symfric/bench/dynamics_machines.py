@@ -27,7 +27,7 @@ G = 9.81
 
 @final
 @dataclass(frozen=True, eq=False)
-class Machine:
+class TimedMachine:
     """Machine with the time in which it settles roughly.
 
     Attributes:
@@ -59,32 +59,32 @@ def law(rng: np.random.Generator, speed: float, least: float = 1.2) -> Law:
     return LuGre(**levels) if kind == 1 else Stribeck(v_eps=1e-3 * speed, **levels)
 
 
-def belt(rng: np.random.Generator) -> Machine:
+def belt(rng: np.random.Generator) -> TimedMachine:
     """Return a block on a belt."""
     m, k, v = rng.uniform(0.3, 3.0), rng.uniform(1.0, 30.0), float(rng.uniform(0.02, 0.2))
     model = rabinowicz(law(rng, v), m=m, k=k, v_belt=v)
-    return Machine(model, 40 * 2 * np.pi * np.sqrt(m / k), "x")
+    return TimedMachine(model, 40 * 2 * np.pi * np.sqrt(m / k), "x")
 
 
-def two_blocks(rng: np.random.Generator) -> Machine:
+def two_blocks(rng: np.random.Generator) -> TimedMachine:
     """Return two blocks on a belt with a spring between them."""
     v, k = float(rng.uniform(0.1, 0.4)), rng.uniform(1.0, 5.0, 3)
     springs = {"k_1": k[0], "k_2": k[1], "k_c": k[2]}
     scene = CoupledBlocks(law(rng, v), v_belt=v, start_2=float(rng.uniform(0.05, 0.2)), **springs)
-    return Machine(scene.model(), 150.0, "x_1")
+    return TimedMachine(scene.model(), 150.0, "x_1")
 
 
-def hunting(rng: np.random.Generator) -> Machine:
+def hunting(rng: np.random.Generator) -> TimedMachine:
     """Return a drive under PID control whose static friction is above the dynamic one."""
     k_p, k_d, k_i = rng.uniform(30, 100), rng.uniform(2, 5), rng.uniform(15, 40)
     x, v, e = Variable("x", "m", start=0.05), Variable("v", "m/s"), Variable("e", "m s")
     pull = -k_p * x - k_d * v - k_i * e
     guide = contact("guide", law(rng, 0.005, 2.2), v.symbol, G, {"v": 0.0}, F_e=pull)
     ode = ca.vertcat(v.symbol, pull - guide.force, x.symbol)
-    return Machine(Model("drive", x=(x, v, e), ode=ode, contacts=(guide,)), 200.0, "x")
+    return TimedMachine(Model("drive", x=(x, v, e), ode=ode, contacts=(guide,)), 200.0, "x")
 
 
-def pendulum(rng: np.random.Generator) -> Machine:
+def pendulum(rng: np.random.Generator) -> TimedMachine:
     """Return a pendulum on a shaft that turns (Froude's pendulum); its load is m g."""
     length, R = rng.uniform(0.2, 1.0), rng.uniform(0.02, 0.1)
     speed = float(rng.uniform(0.2, 1.0)) * R
@@ -93,10 +93,10 @@ def pendulum(rng: np.random.Generator) -> Machine:
     shaft = contact("shaft", law(rng, speed), R * w - speed, G, {"w": speed / R}, F_e=pull)
     ode = ca.vertcat(w.symbol, (pull - shaft.force) * R / length**2)
     model = Model("pendulum", x=(phi, w), ode=ode, contacts=(shaft,))
-    return Machine(model, 60 * 2 * np.pi * np.sqrt(length / G), "phi")
+    return TimedMachine(model, 60 * 2 * np.pi * np.sqrt(length / G), "phi")
 
 
-def crank(rng: np.random.Generator, stiffness: float | ca.SX | None = None) -> Machine:
+def crank(rng: np.random.Generator, stiffness: float | ca.SX | None = None) -> TimedMachine:
     """Return a slider-crank with a spring at its crank, moved by a periodic torque.
 
     With a symbol as its stiffness, the bearing has bristles.
@@ -116,10 +116,10 @@ def crank(rng: np.random.Generator, stiffness: float | ca.SX | None = None) -> M
         return ca.SX(top * ca.sin(2 * ca.pi * t))
 
     u: dict[str, Input] = {"torque": torque}
-    return Machine(mechanism.build(p=p), 30.0, "crank", u, 1.0)
+    return TimedMachine(mechanism.build(p=p), 30.0, "crank", u, 1.0)
 
 
-KINDS: dict[str, Callable[[np.random.Generator], Machine]] = {
+KINDS: dict[str, Callable[[np.random.Generator], TimedMachine]] = {
     "belt": belt, "two blocks": two_blocks, "drive with PID": hunting,
     "pendulum with friction": pendulum, "slider-crank with a spring": crank,
 }  # fmt: skip
@@ -145,7 +145,7 @@ def compared(kind: str, seeds: range) -> Iterator[Found]:
     }  # fmt: skip
 
 
-def differences(machine: Machine) -> tuple[float, float]:
+def differences(machine: TimedMachine) -> tuple[float, float]:
     """Return the relative differences of period and amplitude between orbit and long run.
 
     Raises:
@@ -164,7 +164,7 @@ def differences(machine: Machine) -> tuple[float, float]:
     return abs(cycle.period / (n * orbit.period) - 1), abs(off / size)
 
 
-def _time(machine: Machine, orbit: PeriodicOrbit) -> float:
+def _time(machine: TimedMachine, orbit: PeriodicOrbit) -> float:
     """Return the time [s] after which deviations have decayed to 1e-10 by the multipliers."""
     largest = min(float(np.abs(orbit.multipliers).max(initial=0.0)), 1 - 1e-9)
     periods = np.log(1e-10) / np.log(max(largest, 1e-10))

@@ -27,7 +27,7 @@ TITLE = (
 
 @final
 @dataclass(frozen=True, eq=False)
-class Case:
+class EmbeddedCase:
     """Block with its goals on a Cortex-M4F in single precision.
 
     Attributes:
@@ -47,16 +47,16 @@ def _belt(method: str, name: str) -> Block:
 
 
 CASES = (
-    Case("Brown-McPhee", lambda: law_block(BrownMcPhee()), {"average": 75}),
-    Case("LuGre", lambda: law_block(LuGre()), {"average": 165, "guarded": 210}),
-    Case("GMS(10)", lambda: law_block(GMS(elements=TEN, form="event"), name="gms10"),
+    EmbeddedCase("Brown-McPhee", lambda: law_block(BrownMcPhee()), {"average": 75}),
+    EmbeddedCase("LuGre", lambda: law_block(LuGre()), {"average": 165, "guarded": 210}),
+    EmbeddedCase("GMS(10)", lambda: law_block(GMS(elements=TEN, form="event"), name="gms10"),
          {"average": 550, "text": 800, "stack": 100}),
-    Case("Maxwell(4)", lambda: law_block(MaxwellSlip(form="event"), name="maxwell4"),
+    EmbeddedCase("Maxwell(4)", lambda: law_block(MaxwellSlip(form="event"), name="maxwell4"),
          {"average": 180}),
-    Case("velocity based", lambda: law_block(VelocityBased()), {"average": 50}),
-    Case("belt, Euler", lambda: _belt("backward_euler", "belt_euler"), {"average": 325}),
-    Case("belt, rodas3", lambda: _belt("rodas3", "belt_rodas3"), {}),
-    Case("arm, 6 axes", lambda: inverse_dynamics_block(Arm(BrownMcPhee()).mechanism()),
+    EmbeddedCase("velocity based", lambda: law_block(VelocityBased()), {"average": 50}),
+    EmbeddedCase("belt, Euler", lambda: _belt("backward_euler", "belt_euler"), {"average": 325}),
+    EmbeddedCase("belt, rodas3", lambda: _belt("rodas3", "belt_rodas3"), {}),
+    EmbeddedCase("arm, 6 axes", lambda: inverse_dynamics_block(Arm(BrownMcPhee()).mechanism()),
          {"average": 1850}),
 )  # fmt: skip
 """Laws, Rabinowicz's stick-slip test as a plant, and an arm with joint friction."""
@@ -106,7 +106,7 @@ def bench(quick: bool = False, progress: Progress = None) -> Report:
     return Report().collect(tasks, progress)
 
 
-def _rows(case: Case, targets: Sequence[tuple[str, str]], tools: Tools) -> Iterator[Found]:
+def _rows(case: EmbeddedCase, targets: Sequence[tuple[str, str]], tools: Tools) -> Iterator[Found]:
     block = case.make()
     with TemporaryDirectory(prefix="symfric-") as folder:
         kit = generate(block, Path(folder), real=tuple(dict.fromkeys(real for _, real in targets)))

@@ -13,7 +13,7 @@ from symfric.integrator.cuda.device import Device, DeviceError
 from symfric.integrator.equations.initial import first_guess, first_step, smallest_step
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.many.members import program
-from symfric.integrator.methods.attempt import Given, State
+from symfric.integrator.methods.attempt import Given, SRow
 from symfric.integrator.methods.tableaux import ADAPTIVE
 from symfric.integrator.running.events import Stop
 from symfric.integrator.running.integrator import built
@@ -25,7 +25,7 @@ LANES = "Processor time of an ensemble and of the same runs one by one, on one c
 CUDA = "Ensembles on a graphics processor and on all cores"
 
 
-class Case(NamedTuple):
+class EnsembleCase(NamedTuple):
     """Ensemble over the start value of the first velocity.
 
     Attributes:
@@ -42,11 +42,11 @@ class Case(NamedTuple):
 
 
 CASES = (
-    Case("rabinowicz/brown_mcphee", lambda: rabinowicz(BrownMcPhee()), 20.0, 1),
-    Case("rabinowicz/lugre", lambda: rabinowicz(LuGre()), 20.0, 1),
-    Case("pendulum/brown_mcphee", lambda: Pendulum(BrownMcPhee()).model(), 5.0, 2),
-    Case("slider_crank/brown_mcphee", lambda: SliderCrank(BrownMcPhee()).model(), 1.0, 4),
-    Case("four_bar/brown_mcphee", lambda: FourBar(BrownMcPhee()).model(), 0.5, 4),
+    EnsembleCase("rabinowicz/brown_mcphee", lambda: rabinowicz(BrownMcPhee()), 20.0, 1),
+    EnsembleCase("rabinowicz/lugre", lambda: rabinowicz(LuGre()), 20.0, 1),
+    EnsembleCase("pendulum/brown_mcphee", lambda: Pendulum(BrownMcPhee()).model(), 5.0, 2),
+    EnsembleCase("slider_crank/brown_mcphee", lambda: SliderCrank(BrownMcPhee()).model(), 1.0, 4),
+    EnsembleCase("four_bar/brown_mcphee", lambda: FourBar(BrownMcPhee()).model(), 0.5, 4),
 )
 
 
@@ -79,7 +79,7 @@ def _difference(y: Array, x: Array) -> float:
     return float(np.median((np.abs(y - x) / (np.abs(x).max(axis=0) + 1e-300)).max(axis=1)))
 
 
-def _lanes(case: Case, members: int) -> Iterator[Found]:
+def _lanes(case: EnsembleCase, members: int) -> Iterator[Found]:
     """Measure `simulate_many`, and the compiled loop of `simulate` without its results.
 
     Their attempts may differ because the vector versions of exp, tanh, sin, ... differ from libm in
@@ -110,7 +110,7 @@ def _lanes(case: Case, members: int) -> Iterator[Found]:
         "repeated call, one member [ms]": 1e3 * best["again"],
         "attempts per member": float(attempts.mean()),
         "members with equal attempts [%]": 100.0 * float((attempts == many.attempts).mean()),
-        "relative difference at the end": _difference(y, S[:, State.Y][:, : y.shape[1]]),
+        "relative difference at the end": _difference(y, S[:, SRow.Y][:, : y.shape[1]]),
     }  # fmt: skip
 
 
@@ -126,7 +126,7 @@ def _one_by_one(
     y, d = first_guess(integrator.system, model, x), np.hstack([p, data])
     if integrator.system.algebraic[0] or integrator.system.manifold is not None:
         y = np.array([integrator.start(one, given) for one, given in zip(y, d, strict=True)])
-    S = np.ascontiguousarray(State.at(0.0, first_step(end), y))
+    S = np.ascontiguousarray(SRow.at(0.0, first_step(end), y))
     atol = 0.1 * RTOL * integrator.system.nominal
     R = np.ascontiguousarray(Given.of(end, RTOL, np.inf, atol, d))
 

@@ -32,7 +32,7 @@ EVERY = 12
 """Quick runs read every twelfth file."""
 
 
-class Outcome(NamedTuple):
+class FileOutcome(NamedTuple):
     """Outcome for one file.
 
     Attributes:
@@ -48,7 +48,7 @@ class Outcome(NamedTuple):
     message: str
 
 
-def outcome(file: File) -> Outcome:
+def outcome(file: File) -> FileOutcome:
     """Return the outcome of reading, checking and fitting one file."""
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -60,7 +60,7 @@ def outcome(file: File) -> Outcome:
             kind, message = "refused", str(error)
         except Exception as error:  # noqa: BLE001  (any error is counted and shown)
             kind, message = "crashed", f"{type(error).__name__}: {error}"
-    return Outcome(file.name, file.truth, kind, message)
+    return FileOutcome(file.name, file.truth, kind, message)
 
 
 def _judged(path: Path, file: File) -> tuple[str, str]:

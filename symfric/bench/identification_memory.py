@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from identification import Dataset, Fit, Fitted, Measured, Points, Shooting, fit_elements
-from identification.select import Ranking, select
+from identification.select import FitRanking, select
 from symfric import GMS, Element, Hold, Law, LuGre, MaxwellSlip, Slider, Status, simulate
 from symfric.bench.report import Found, goal, timed
 from symfric.foundation.numeric import Array
@@ -145,7 +145,7 @@ def gms(quick: bool) -> Iterator[Found]:
     yield goal(what, ratio, 1.0, ">=", seconds, note)
 
 
-def ranked() -> Ranking:
+def ranked() -> FitRanking:
     """Return the ranking of GMS and LuGre on data of four unequal elements and another path."""
     law, rng = _true(4), np.random.default_rng(0)
     slow = _record(law, _slow("hysteresis", 0.04), "hysteresis", rng)

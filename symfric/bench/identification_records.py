@@ -26,7 +26,7 @@ NOISE, FINEST = 0.5, 1e-9
 """Standard deviations of the noise of a force [N] and of a nearly exact position [m]."""
 
 
-class Motion(NamedTuple):
+class SampledMotion(NamedTuple):
     """Times, positions, velocities and accelerations, each of shape (n,)."""
 
     t: Array
@@ -34,15 +34,15 @@ class Motion(NamedTuple):
     v: Array
     a: Array
 
-    def sampled(self) -> "Motion":
+    def sampled(self) -> "SampledMotion":
         """Return every sample of the record, without the fine steps between them."""
-        return Motion(*(part[::FINE] for part in self))
+        return SampledMotion(*(part[::FINE] for part in self))
 
 
 def motion(
     rng: Generator, top: float = SPEED, least: float = 0.05, one_way: bool = False,
     fast: float = 1.0,
-) -> Motion:  # fmt: skip
+) -> SampledMotion:  # fmt: skip
     """Return strokes of three frequencies with random phases, slow at first and at the end.
 
     Args:
@@ -60,7 +60,7 @@ def motion(
     v *= top / np.abs(v).max()
     h = t[1]
     x = np.concatenate([[0.0], np.cumsum(h * (v[1:] + v[:-1]) / 2)])
-    return Motion(t, x, v, np.gradient(v, t))
+    return SampledMotion(t, x, v, np.gradient(v, t))
 
 
 def curve(v: Array, mu_s: float, mu_d: float, v_s: float, sigma_2: float) -> Array:
@@ -96,11 +96,11 @@ def ar(rng: Generator, n: int, rho: float, size: float) -> Array:
     return size * e
 
 
-Change = Callable[[Generator, Motion, Array], tuple[Array, Array]]
+Change = Callable[[Generator, SampledMotion, Array], tuple[Array, Array]]
 """Function of generator, motion and exact force that returns recorded positions and forces."""
 
 
-def exact(rng: Generator, m: Motion, F: Array) -> tuple[Array, Array]:
+def exact(rng: Generator, m: SampledMotion, F: Array) -> tuple[Array, Array]:
     """Return the record without further errors."""
     del rng
     return m.x, F
@@ -109,24 +109,24 @@ def exact(rng: Generator, m: Motion, F: Array) -> tuple[Array, Array]:
 def encoder(step: float) -> Change:
     """Return the rounding of positions to multiples of `step` [m]."""
 
-    def change(rng: Generator, m: Motion, F: Array) -> tuple[Array, Array]:
+    def change(rng: Generator, m: SampledMotion, F: Array) -> tuple[Array, Array]:
         return step * np.round((m.x + step * rng.uniform()) / step), F
 
     return change
 
 
-def jitter(rng: Generator, m: Motion, F: Array) -> tuple[Array, Array]:
+def jitter(rng: Generator, m: SampledMotion, F: Array) -> tuple[Array, Array]:
     """Return positions at times that scatter by 0.3 ms."""
     return np.interp(m.t + 3e-4 * rng.standard_normal(m.t.size), m.t, m.x), F
 
 
-def delay(rng: Generator, m: Motion, F: Array, late: float = 2e-3) -> tuple[Array, Array]:
+def delay(rng: Generator, m: SampledMotion, F: Array, late: float = 2e-3) -> tuple[Array, Array]:
     """Return forces that are `late` [s]."""
     del rng
     return m.x, np.interp(m.t - late, m.t, F)
 
 
-def backlash(rng: Generator, m: Motion, F: Array, play: float = 2e-5) -> tuple[Array, Array]:
+def backlash(rng: Generator, m: SampledMotion, F: Array, play: float = 2e-5) -> tuple[Array, Array]:
     """Return positions of an encoder that follows the stage with a play [m]."""
     del rng
     path = [m.x[0]]
@@ -135,63 +135,63 @@ def backlash(rng: Generator, m: Motion, F: Array, play: float = 2e-5) -> tuple[A
     return np.array(path), F
 
 
-def saturated(rng: Generator, m: Motion, F: Array) -> tuple[Array, Array]:
+def saturated(rng: Generator, m: SampledMotion, F: Array) -> tuple[Array, Array]:
     """Return forces of a sensor that loses 10 % of the gain at the largest force."""
     del rng
     return m.x, F * (1 - 0.1 * (F / np.abs(F).max()) ** 2)
 
 
-def loaded(rng: Generator, m: Motion, F: Array) -> tuple[Array, Array]:
+def loaded(rng: Generator, m: SampledMotion, F: Array) -> tuple[Array, Array]:
     """Return forces of a guide that rubs with 5 % of the force of inertia."""
     del rng
     return m.x, F + 0.05 * M * np.abs(m.a) * np.sign(m.v)
 
 
-def drift(rng: Generator, m: Motion, F: Array) -> tuple[Array, Array]:
+def drift(rng: Generator, m: SampledMotion, F: Array) -> tuple[Array, Array]:
     """Return forces whose viscous part falls by 30 % over time, and the Coulomb level by 10 %."""
     del rng
     share = m.t / m.t[-1]
     return m.x, F - share * (0.3 * CURVE["sigma_2"] * m.v + 0.1 * CURVE["mu_d"] * np.sign(m.v))
 
 
-def warm_up(rng: Generator, m: Motion, F: Array) -> tuple[Array, Array]:
+def warm_up(rng: Generator, m: SampledMotion, F: Array) -> tuple[Array, Array]:
     """Return forces whose viscous part falls by 30 % with the dissipated energy."""
     del rng
     heat = np.cumsum(np.abs(m.v))
     return m.x, F - 0.3 * (1 - np.exp(-3 * heat / heat[-1])) * CURVE["sigma_2"] * m.v
 
 
-def uneven(rng: Generator, m: Motion, F: Array) -> tuple[Array, Array]:
+def uneven(rng: Generator, m: SampledMotion, F: Array) -> tuple[Array, Array]:
     """Return forces with a Coulomb level that varies by 6 % over the position."""
     way = 2 * np.pi * (m.x / 0.05 + rng.uniform())
     return m.x, F + 0.06 * CURVE["mu_d"] * np.sign(m.v) * np.sin(way)
 
 
-def cogging(rng: Generator, m: Motion, F: Array) -> tuple[Array, Array]:
+def cogging(rng: Generator, m: SampledMotion, F: Array) -> tuple[Array, Array]:
     """Return forces with a ripple of 2 N over the position."""
     return m.x, F + 2.0 * np.sin(2 * np.pi * (m.x / 0.01 + rng.uniform()))
 
 
-def clipped(rng: Generator, m: Motion, F: Array) -> tuple[Array, Array]:
+def clipped(rng: Generator, m: SampledMotion, F: Array) -> tuple[Array, Array]:
     """Return forces limited to 80 % of the largest one."""
     del rng
     most = 0.8 * np.abs(F).max()
     return m.x, np.clip(F, -most, most)
 
 
-def held(rng: Generator, m: Motion, F: Array) -> tuple[Array, Array]:
+def held(rng: Generator, m: SampledMotion, F: Array) -> tuple[Array, Array]:
     """Return forces of which the logger stores every fourth one four times."""
     del rng
     return m.x, F[4 * (np.arange(F.size) // 4)]
 
 
-def gained(rng: Generator, m: Motion, F: Array) -> tuple[Array, Array]:
+def gained(rng: Generator, m: SampledMotion, F: Array) -> tuple[Array, Array]:
     """Return forces of a sensor with a gain of 1.05 in one direction."""
     del rng
     return m.x, np.where(F > 0, 1.05, 1.0) * F
 
 
-def heavy_tails(rng: Generator, m: Motion, F: Array) -> tuple[Array, Array]:
+def heavy_tails(rng: Generator, m: SampledMotion, F: Array) -> tuple[Array, Array]:
     """Return forces with noise of Student's t distribution with four degrees of freedom."""
     return m.x, F + 0.3 * rng.standard_t(4, F.size)
 

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 @final
 @dataclass(frozen=True)
-class Scene:
+class Setup:
     """Experiment with known parameters.
 
     Attributes:
@@ -155,82 +155,82 @@ simple = partial(fine, law="coulomb+viscous", friction=flat, position=FINEST)
 """Stage with Coulomb and viscous friction, truly and in the model."""
 
 SCENES = (
-    Scene("curve, coulomb+viscous", "right",
+    Setup("curve, coulomb+viscous", "right",
           partial(points, law="coulomb+viscous", friction=flat), PLAIN),
-    Scene("curve, stribeck", "right", points, CURVE),
-    Scene("stage, coulomb+viscous", "right", simple, COULOMB),
-    Scene("stage, coulomb+viscous, AR(1) 0.9", "right", partial(simple, rho=0.9), COULOMB),
-    Scene("stage, stribeck", "right", fine, STRIBECK),
-    Scene("stage, stribeck, AR(1) 0.9", "right", partial(fine, rho=0.9), STRIBECK),
-    Scene("stage, no peak, stribeck fitted", "right", partial(fine, friction=flat), COULOMB),
-    Scene("stage, peak hardly in the data", "right",
+    Setup("curve, stribeck", "right", points, CURVE),
+    Setup("stage, coulomb+viscous", "right", simple, COULOMB),
+    Setup("stage, coulomb+viscous, AR(1) 0.9", "right", partial(simple, rho=0.9), COULOMB),
+    Setup("stage, stribeck", "right", fine, STRIBECK),
+    Setup("stage, stribeck, AR(1) 0.9", "right", partial(fine, rho=0.9), STRIBECK),
+    Setup("stage, no peak, stribeck fitted", "right", partial(fine, friction=flat), COULOMB),
+    Setup("stage, peak hardly in the data", "right",
           partial(fine, friction=partial(records.curve, **records.HIDDEN), noise=2.0),
           STAGE | records.HIDDEN),
-    Scene("bristles", "right", memory, BRISTLE),
-    Scene("creeping bristles", "right", partial(memory, creeping=True),
+    Setup("bristles", "right", memory, BRISTLE),
+    Setup("creeping bristles", "right", partial(memory, creeping=True),
           {"sigma_0": BRISTLE["sigma_0"]}),
-    Scene("shooting", "right", shooting, BLOCK),
-    Scene("shooting, AR(1) 0.6", "right", partial(shooting, rho=0.6), BLOCK),
-    Scene("shooting, AR(1) 0.9", "record", partial(shooting, rho=0.9), BLOCK),
-    Scene("stage, position noise 0.1 um", "record", stage, STRIBECK),
-    Scene("stage, position noise 1 um", "record", partial(stage, position=1e-6), STRIBECK),
-    Scene("stage, position noise 5 um", "record", partial(stage, position=5e-6), STRIBECK),
-    Scene("stage, encoder 5 um", "record", partial(stage, position=0.0,
+    Setup("shooting", "right", shooting, BLOCK),
+    Setup("shooting, AR(1) 0.6", "right", partial(shooting, rho=0.6), BLOCK),
+    Setup("shooting, AR(1) 0.9", "record", partial(shooting, rho=0.9), BLOCK),
+    Setup("stage, position noise 0.1 um", "record", stage, STRIBECK),
+    Setup("stage, position noise 1 um", "record", partial(stage, position=1e-6), STRIBECK),
+    Setup("stage, position noise 5 um", "record", partial(stage, position=5e-6), STRIBECK),
+    Setup("stage, encoder 5 um", "record", partial(stage, position=0.0,
           change=records.encoder(5e-6)),
           STRIBECK),
-    Scene("stage, encoder 20 um", "record", partial(stage, position=0.0,
+    Setup("stage, encoder 20 um", "record", partial(stage, position=0.0,
           change=records.encoder(2e-5)),
           STRIBECK),
-    Scene("stage, jitter 0.3 ms", "record", partial(stage, change=records.jitter), STRIBECK),
-    Scene("stage, delay 2 ms", "record", partial(stage, change=records.delay), STRIBECK),
-    Scene("stage, clipped force", "record", partial(stage, change=records.clipped), STRIBECK),
-    Scene("stage, one direction", "record", partial(stage, one_way=True), STRIBECK),
-    Scene("bristles, position noise 0.2 um", "record",
+    Setup("stage, jitter 0.3 ms", "record", partial(stage, change=records.jitter), STRIBECK),
+    Setup("stage, delay 2 ms", "record", partial(stage, change=records.delay), STRIBECK),
+    Setup("stage, clipped force", "record", partial(stage, change=records.clipped), STRIBECK),
+    Setup("stage, one direction", "record", partial(stage, one_way=True), STRIBECK),
+    Setup("bristles, position noise 0.2 um", "record",
           partial(memory, creeping=True, position=2e-7), {"sigma_0": BRISTLE["sigma_0"]}),
-    Scene("bristles, loaded start", "record", partial(memory, start=0.9), BRISTLE),
-    Scene("stage, drift in time", "wrong", partial(fine, change=records.drift), STRIBECK),
-    Scene("stage, warming up", "wrong", partial(fine, change=records.warm_up), STRIBECK),
-    Scene("stage, uneven track", "wrong", partial(fine, change=records.uneven), STRIBECK),
-    Scene("stage, cogging", "wrong", partial(fine, change=records.cogging), STRIBECK),
-    Scene("stage, wrong mass", "wrong", partial(fine, given={"fixed": {"m": 0.95 * M}}), STRIBECK),
-    Scene("stage, no peak in the model", "wrong", partial(fine, law="coulomb+viscous"), COULOMB),
-    Scene("stage, bristles as coulomb+viscous", "wrong",
+    Setup("bristles, loaded start", "record", partial(memory, start=0.9), BRISTLE),
+    Setup("stage, drift in time", "wrong", partial(fine, change=records.drift), STRIBECK),
+    Setup("stage, warming up", "wrong", partial(fine, change=records.warm_up), STRIBECK),
+    Setup("stage, uneven track", "wrong", partial(fine, change=records.uneven), STRIBECK),
+    Setup("stage, cogging", "wrong", partial(fine, change=records.cogging), STRIBECK),
+    Setup("stage, wrong mass", "wrong", partial(fine, given={"fixed": {"m": 0.95 * M}}), STRIBECK),
+    Setup("stage, no peak in the model", "wrong", partial(fine, law="coulomb+viscous"), COULOMB),
+    Setup("stage, bristles as coulomb+viscous", "wrong",
           partial(fine, law="coulomb+viscous", bristles=True), COULOMB),
-    Scene("stage, asymmetric", "wrong", partial(simple, friction=records.asymmetric), COULOMB),
-    Scene("curve, quadratic drag", "wrong",
+    Setup("stage, asymmetric", "wrong", partial(simple, friction=records.asymmetric), COULOMB),
+    Setup("curve, quadratic drag", "wrong",
           partial(points, law="coulomb+viscous", friction=records.quadratic), PLAIN),
-    Scene("curve, exponent not in the data", "right",
+    Setup("curve, exponent not in the data", "right",
           partial(points, law=SteadyStateLuGre(), friction=flat, free=["delta"]),
           {"sigma_2": CURVE["sigma_2"]}),
-    Scene("shooting, no peak in the model", "wrong", partial(shooting, law=PEAK), BLOCK),
-    Scene("kept: stage, heavy tails", "right", partial(simple, change=records.heavy_tails),
+    Setup("shooting, no peak in the model", "wrong", partial(shooting, law=PEAK), BLOCK),
+    Setup("kept: stage, heavy tails", "right", partial(simple, change=records.heavy_tails),
           COULOMB, True),
-    Scene("kept: stage, asymmetric law", "right",
+    Setup("kept: stage, asymmetric law", "right",
           partial(simple, law="asymmetric(coulomb+viscous)", friction=records.asymmetric, rho=0.5),
           {"m": M, "mu_d_pos": 22.0 + OFFSET, "mu_d_neg": 20.0 - OFFSET, "sigma_2_pos": 220.0,
            "sigma_2_neg": 200.0},
           True),
-    Scene("kept: curve of few points", "right", partial(points, count=30), CURVE, True),
-    Scene("stage, held force", "record", partial(fine, change=records.held), STRIBECK),
-    Scene("kept: stage, encoder 1 um, AR(1) 0.7", "record",
+    Setup("kept: curve of few points", "right", partial(points, count=30), CURVE, True),
+    Setup("stage, held force", "record", partial(fine, change=records.held), STRIBECK),
+    Setup("kept: stage, encoder 1 um, AR(1) 0.7", "record",
           partial(stage, position=0.0, change=records.encoder(1e-6), rho=0.7), STRIBECK, True),
-    Scene("stage, one-sided gain", "wrong", partial(simple, change=records.gained), COULOMB),
-    Scene("kept: stage, root of the speed", "wrong", partial(simple, friction=records.root),
+    Setup("stage, one-sided gain", "wrong", partial(simple, change=records.gained), COULOMB),
+    Setup("kept: stage, root of the speed", "wrong", partial(simple, friction=records.root),
           COULOMB, True),
-    Scene("kept: stage, warming up, coulomb+viscous", "wrong", partial(simple,
+    Setup("kept: stage, warming up, coulomb+viscous", "wrong", partial(simple,
           change=records.warm_up),
           COULOMB, True),
-    Scene("kept: shooting, missing spring", "wrong", partial(shooting, spring=0.5), BLOCK, True),
-    Scene("kept: stage, delay 1 ms, AR(1) 0.7", "record",
+    Setup("kept: shooting, missing spring", "wrong", partial(shooting, spring=0.5), BLOCK, True),
+    Setup("kept: stage, delay 1 ms, AR(1) 0.7", "record",
           partial(stage, change=partial(records.delay, late=1e-3), rho=0.7), STRIBECK, True),
-    Scene("kept: bristles, position noise 1 um", "record", partial(memory, position=1e-6), BRISTLE,
+    Setup("kept: bristles, position noise 1 um", "record", partial(memory, position=1e-6), BRISTLE,
           True),
-    Scene("kept: stage, backlash of the encoder", "record", partial(stage, change=records.backlash),
+    Setup("kept: stage, backlash of the encoder", "record", partial(stage, change=records.backlash),
           STRIBECK, True),
-    Scene("kept: stage, saturating sensor", "wrong", partial(simple, change=records.saturated),
+    Setup("kept: stage, saturating sensor", "wrong", partial(simple, change=records.saturated),
           COULOMB,
           True),
-    Scene("kept: stage, friction of the guide under load", "wrong", partial(simple,
+    Setup("kept: stage, friction of the guide under load", "wrong", partial(simple,
           change=records.loaded),
           COULOMB, True),
 )  # fmt: skip
@@ -258,7 +258,7 @@ class Count(NamedTuple):
         covered: parameter -> intervals that contain the truth, and number of intervals.
     """
 
-    scene: Scene
+    scene: Setup
     statuses: Counter[str]
     covered: dict[str, tuple[int, int]]
 
@@ -278,7 +278,7 @@ class Count(NamedTuple):
                     yield name, share
 
 
-def counted(scene: Scene, seeds: Sequence[int]) -> Count:
+def counted(scene: Setup, seeds: Sequence[int]) -> Count:
     """Fit a scene with each of `seeds`."""
     statuses, covered = Counter[str](), dict[str, tuple[int, int]]()
     number = SCENES.index(scene)

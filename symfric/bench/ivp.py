@@ -13,7 +13,7 @@ import numpy as np
 
 from symfric import Model, Output, Trajectory, Variable, simulate
 from symfric.bench.ivp_problems import PROBLEMS as OTHERS
-from symfric.bench.ivp_problems import TEST_SET, Problem, published
+from symfric.bench.ivp_problems import TEST_SET, InitialValueProblem, published
 from symfric.bench.report import Found, Progress, Report, backend, best_time, curves
 from symfric.multibody import JointSpringDamper, Mechanism, PointOnLine, Revolute, SpringDamper
 
@@ -232,7 +232,7 @@ def car_axis() -> Model:
     )
 
 
-JOINT = Problem(
+JOINT = InitialValueProblem(
     "Andrews' squeezer, joint coordinates",
     lambda: mechanism().build(),
     ANDREWS.t_end,
@@ -257,7 +257,9 @@ DRIFT = "Drift of constraints that are imposed on the accelerations only"
 
 
 def bench(
-    quick: bool = False, problems: Sequence[Problem] = PROBLEMS, progress: Progress = None
+    quick: bool = False,
+    problems: Sequence[InitialValueProblem] = PROBLEMS,
+    progress: Progress = None,
 ) -> Report:
     """Measure all problems; with `quick`, at rtol 1e-6 only."""
     tasks = {problem.name: partial(_rows, problem, quick) for problem in problems}
@@ -266,7 +268,7 @@ def bench(
     return Report((DIGITS, draw), notes=[source]).collect(tasks, progress)
 
 
-def _rows(problem: Problem, quick: bool) -> Iterator[Found]:
+def _rows(problem: InitialValueProblem, quick: bool) -> Iterator[Found]:
     model = problem.model()
     for method in METHODS:
         tolerances = TOLERANCES[:1] if quick or method in problem.laborious else TOLERANCES
@@ -275,7 +277,7 @@ def _rows(problem: Problem, quick: bool) -> Iterator[Found]:
 
 
 def measure(
-    problem: Problem, model: Model, method: str, rtol: float, engine: str | None = None
+    problem: InitialValueProblem, model: Model, method: str, rtol: float, engine: str | None = None
 ) -> Iterator[Found]:
     """Integrate one problem; yield the row of its correct digits and the row of its drift.
 
@@ -306,7 +308,7 @@ def measure(
         yield DRIFT, case | {"largest constraint violation": drift}
 
 
-def correct_digits(problem: Problem, run: Trajectory) -> tuple[float, str]:
+def correct_digits(problem: InitialValueProblem, run: Trajectory) -> tuple[float, str]:
     """Return the number of correct digits of the worst signal at the end, and its name."""
     end = run.final
     errors = {

@@ -19,7 +19,7 @@ TEST_SET = (
 
 @final
 @dataclass(frozen=True, eq=False)
-class Problem:
+class InitialValueProblem:
     """Initial-value problem with its published solution at the end.
 
     Attributes:
@@ -45,10 +45,10 @@ class Problem:
 PUBLISHED = tomllib.loads(Path(__file__).with_name("ivp_problems.toml").read_text("utf-8"))
 
 
-def published(name: str, model: Callable[[], Model], **more: Any) -> Problem:
+def published(name: str, model: Callable[[], Model], **more: Any) -> InitialValueProblem:
     """Return a problem of the test set with its stored solution."""
     found = dict(PUBLISHED[name])
-    return Problem(name, model, found.pop("t_end"), found, **more)
+    return InitialValueProblem(name, model, found.pop("t_end"), found, **more)
 
 
 def unknowns(

@@ -17,7 +17,7 @@ from symfric.foundation.numeric import bound
 from symfric.foundation.programs import find_compiler
 from symfric.integrator.equations.initial import consistent, first_guess
 from symfric.integrator.equations.inputs import input_data
-from symfric.integrator.methods.attempt import Given, State
+from symfric.integrator.methods.attempt import Given, SRow
 from symfric.integrator.methods.tableaux import METHODS
 from symfric.integrator.running.integrator import Integrator
 from symfric.multibody import JointFriction, Mechanism, Revolute
@@ -44,7 +44,7 @@ BUDGET = 120.0
 
 @final
 @dataclass(frozen=True, eq=False)
-class Case:
+class MechanismCase:
     """Scene and the states that are compared.
 
     Attributes:
@@ -63,11 +63,11 @@ class Case:
         return np.linspace(0.0, self.t_end, 26)[1:]
 
 
-CASES: dict[str, Case] = {
-    "slider_crank": Case(
+CASES: dict[str, MechanismCase] = {
+    "slider_crank": MechanismCase(
         SliderCrank(CRANK), 0.25, {"joint": ("slider",), "absolute": ("block_x",)}
     ),
-    "pendulum_box": Case(PendulumBox(BrownMcPhee()), 15.0, {"joint": ("x",)}),
+    "pendulum_box": MechanismCase(PendulumBox(BrownMcPhee()), 15.0, {"joint": ("x",)}),
 }
 
 
@@ -253,7 +253,7 @@ def step_time(made: Integrator) -> float:
     y = first_guess(whole, model, model.initial_state())
     d = np.zeros(whole.d.numel())
     y = consistent(whole, "bench", y, d)
-    S = State.at(0.0, 1e-4, y)
+    S = SRow.at(0.0, 1e-4, y)
     R = Given.of(1.0, 1e-6, 1.0, 1e-7 * whole.nominal, d)
     S_out, D = np.zeros(S.size), np.zeros(made.step.numel_out(1))
     return best_time(bound(made.step, (S, R), (S_out, D)), budget=0.1, most=1000)[0]

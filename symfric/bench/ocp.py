@@ -23,7 +23,7 @@ import numpy as np
 from ocp import Phase, Problem, at_end, effort, track
 from ocp.problems import guide
 from symfric import BrownMcPhee, ExactCoulomb, Law, LuGre, Model, drive
-from symfric.bench.ocp_cases import CASES, QUICK, Case
+from symfric.bench.ocp_cases import CASES, QUICK, MoveCase
 from symfric.bench.ocp_contenders import (
     Attempt,
     Contender,
@@ -35,7 +35,7 @@ from symfric.bench.ocp_contenders import (
     rockit,
     symfric,
 )
-from symfric.bench.ocp_referee import Verdict, judged
+from symfric.bench.ocp_referee import ControlVerdict, judged
 from symfric.bench.report import Found, Progress, Report, Row, curves
 from symfric.foundation.numeric import Array
 from symfric.foundation.parameters import check_names
@@ -73,14 +73,14 @@ def bench(
     return Report((TITLE, draw)).collect(tasks, progress)
 
 
-def _found(case: Case, who: str, contender: Contender, quick: bool) -> Iterator[Found]:
+def _found(case: MoveCase, who: str, contender: Contender, quick: bool) -> Iterator[Found]:
     attempt, seconds = attempted(contender, case, QUICK_LIMIT if quick else LIMIT)
     yield TITLE, row_of(case, who, attempt, seconds)
 
 
-def row_of(case: Case, who: str, attempt: Attempt | str, seconds: float) -> Row:
+def row_of(case: MoveCase, who: str, attempt: Attempt | str, seconds: float) -> Row:
     """Return the row of an attempt; a text is the reason why there is none."""
-    verdict, claimed, intervals, status = Verdict(nan, nan), nan, nan, attempt
+    verdict, claimed, intervals, status = ControlVerdict(nan, nan), nan, nan, attempt
     if isinstance(attempt, Attempt):
         verdict = judged(case, attempt.edges, attempt.controls)
         claimed, status, intervals = attempt.claimed, attempt.status, attempt.controls.size
@@ -154,7 +154,7 @@ def controllers(cycles: int = CYCLES) -> Iterator[Found]:
 # ---- opty and Dymos, which do not use CasADi, and the list of all contenders ----
 
 
-def opty(case: Case, limit: float, width: float) -> Attempt:
+def opty(case: MoveCase, limit: float, width: float) -> Attempt:
     """Return the solution by the midpoint rule with opty, in SymPy and compiled C."""
     tool: Any = import_module("opty")
     sm: Any = import_module("sympy")
@@ -209,7 +209,7 @@ SAMPLES = 40
 """Number of samples of the control in each segment of Dymos."""
 
 
-def _dynamics(om: Any, case: Case, width: float) -> Any:
+def _dynamics(om: Any, case: MoveCase, width: float) -> Any:
     """Return the component of OpenMDAO with the equations; the cost is a state J."""
 
     class Dynamics(om.ExplicitComponent):
@@ -235,11 +235,11 @@ def _dynamics(om: Any, case: Case, width: float) -> Any:
     return Dynamics
 
 
-def _names(case: Case) -> list[str]:
+def _names(case: MoveCase) -> list[str]:
     return [*(f"x_{name}" for name in case.states), "J"]
 
 
-def _phase(tool: Any, case: Case, equations: Any, a: float, b: float) -> Any:
+def _phase(tool: Any, case: MoveCase, equations: Any, a: float, b: float) -> Any:
     """Return the phase between two fractions of T."""
     scheme = tool.Radau(num_segments=round((b - a) * case.intervals / 3), order=3)
     phase = tool.Phase(ode_class=equations, transcription=scheme)
@@ -261,7 +261,7 @@ def _phase(tool: Any, case: Case, equations: Any, a: float, b: float) -> Any:
     return phase
 
 
-def dymos(case: Case, limit: float, width: float) -> Attempt:
+def dymos(case: MoveCase, limit: float, width: float) -> Attempt:
     """Return the solution by Radau pseudospectral collocation of order 3 in Dymos, with SLSQP.
 
     Each segment has a cubic control, so a third of the intervals gives about as many unknowns of
@@ -331,7 +331,7 @@ def cpu() -> float:
     return sum(os.times()[:4])
 
 
-def attempted(contender: Contender, case: Case, limit: float) -> tuple[Attempt | str, float]:
+def attempted(contender: Contender, case: MoveCase, limit: float) -> tuple[Attempt | str, float]:
     """Return the attempt, or the reason why there is none, and its processor time [s].
 
     Raises:

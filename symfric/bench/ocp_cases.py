@@ -32,7 +32,7 @@ def _ones(m: Any, x: Sequence[Any], u: Any) -> list[Any]:
 
 @final
 @dataclass(frozen=True, eq=False)
-class Case:
+class MoveCase:
     """Problem of one input with dry friction.
 
     Attributes:
@@ -104,7 +104,7 @@ class Case:
         return ready.make(v_t=width * self.speed) if ready else _stated(self, width)
 
 
-def _stated(case: Case, width: float) -> Problem:
+def _stated(case: MoveCase, width: float) -> Problem:
     x = tuple(
         Variable(name, "1", start=at, nominal=case.size.get(i, 1.0))
         for i, (name, at) in enumerate(zip(case.states, case.start, strict=True))
@@ -225,62 +225,62 @@ def _upright_end(m: Any, x: Sequence[Any], u: Any) -> Any:
 
 
 CASES = (
-    Case(
+    MoveCase(
         "out_and_back", OURS, ("x", "v"), _mass, (1,), (GUIDE,), (0.0, 0.0),
         {0.5: {0: 1.0}, 1.0: _rest(0.0, 0.0)}, limit=20.0, T=2.0,
     ),
-    Case(
+    MoveCase(
         "pendulum", OURS, ("phi", "phi_rate"), _pendulum, (1,), ((0.15, 0.1),), (0.0, 0.0),
         {1.0: _rest(pi, 0.0)}, limit=3.0, T=5.0, intervals=100, size={0: 3.0, 1: 5.0},
     ),
-    Case(
+    MoveCase(
         "cart_pendulum", OURS, ("x", "theta", "x_rate", "theta_rate"),
         _cart(1.0, 0.3, 0.5, damping=0.1), (2,), ((2.2, 1.5),), (0.0,) * 4,
         {1.0: _rest(0.8, pi, 0.0, 0.0)}, limit=20.0, T=2.0,
         bounds={0: (-2.0, 2.0)}, size={1: 3.0, 3: 5.0},
     ),
-    Case(
+    MoveCase(
         "cart_pole", "example of nosnoc", ("x", "theta", "v", "w"), _cart(1.0, 0.1, 1.0), (2,),
         ((2.0, 2.0),), (1.0, 0.0, 0.0, 0.0), {1.0: {}}, limit=30.0, T=5.0,
         running=_upright, final=_upright_end, bounds={0: (-5.0, 5.0)}, size={1: 3.0, 3: 5.0},
     ),
-    Case(
+    MoveCase(
         "voice_coil", "example of nosnoc after Christiansen, Maurer and Zirn, CDC 2008",
         ("x1", "v1", "x2", "v2", "I"), _coil, (1,), ((2.1, 2.1),), (0.0,) * 5,
         {1.0: _rest(0.01, 0.0, 0.01, 0.0, 0.0)}, limit=5.0, T=0.08, speed=0.2,
         size={0: 0.01, 1: 0.2, 2: 0.01, 3: 0.2},
     ),
-    Case(
+    MoveCase(
         "floating_oscillator", "Kim, Kased and Singh, Optim. Control Appl. Meth. 29, 2008, 257, "
         "with given time and least squared force", ("x1", "x2", "v1", "v2"), _oscillator, (2,),
         ((0.5, 0.5),), (0.0,) * 4, {1.0: _rest(1.0, 1.0, 0.0, 0.0)}, limit=2.0, T=6.0,
     ),
-    Case(
+    MoveCase(
         "pushed_block", "example of opty (10 m out and back, friction with slack variables), with "
         "given time and least squared force", ("x", "v"), _pushed, (1,), ((5.886, 5.886),),
         (0.0, 0.0), {0.5: _rest(10.0, 0.0), 1.0: _rest(0.0, 0.0)}, limit=400.0, T=4.0, speed=10.0,
         size={0: 10.0, 1: 10.0},
     ),
-    Case(
+    MoveCase(
         "capsule", "two-mass robot after Chernousko, J. Appl. Math. Mech. 66, 2002: 50 mm on rough "
         "ground by an inner mass of +- 0.1 m", ("x", "v", "s", "r"), _capsule, (1,), ((2.0, 1.5),),
         (0.0,) * 4, {1.0: _rest(0.05, 0.0, 0.0, 0.0)}, limit=10.0, T=2.0, speed=0.1,
         bounds={2: (-0.1, 0.1)}, size={0: 0.05, 1: 0.1, 2: 0.1},
     ),
-    Case(
+    MoveCase(
         "parcel_on_tray", OURS, ("x", "v", "tilt", "tilt_rate"), _tray, (1,), ((0.4, 0.3),),
         (0.3, 0.0, 0.0, 0.0), {1.0: _rest(0.0, 0.0, 0.0, 0.0)}, limit=15.0, T=1.5,
         normal=_tray_load, bounds={2: (-1.2, 1.2)},
     ),
-    Case(
+    MoveCase(
         "load_through_spring", OURS, ("x_motor", "x", "v_motor", "v"), _spring(guided=False), (3,),
         (GUIDE,), (0.0,) * 4, BACK, limit=40.0, T=2.0,
     ),
-    Case(
+    MoveCase(
         "two_blocks", OURS, ("x_motor", "x", "v_motor", "v"), _spring(guided=True), (2, 3),
         ((3.0, 2.0), GUIDE), (0.0,) * 4, BACK, limit=40.0, T=2.0,
     ),
-    Case(
+    MoveCase(
         "three_blocks", "Stewart, J. Austral. Math. Soc. B 37, 1996, 288-308: the third block, now "
         "pushed by the input, stops at 1", ("q1", "q2", "q3", "v1", "v2", "v3"), _blocks, (3, 4, 5),
         ((0.3, 0.3),) * 3, (-1.0, 1.0, -1.0, -1.0, 1.0, 1.0),

@@ -1,7 +1,7 @@
 """symfric and tools on CasADi in the benchmark of optimal control, with recommended settings.
 
-A contender maps a `Case` to an `Attempt`. Tools without dry friction solve the problem with the
-smooth friction of `Case.smooth`, from a linear guess, with Ipopt; nosnoc solves it with Coulomb
+A contender maps a `MoveCase` to an `Attempt`. Tools without dry friction solve the problem with the
+smooth friction of `MoveCase.smooth`, from a linear guess, with Ipopt; nosnoc solves it with Coulomb
 friction (no static level above the sliding one).
 """
 
@@ -16,7 +16,7 @@ import casadi as ca
 import numpy as np
 
 from ocp import Problem, Solution, solve
-from symfric.bench.ocp_cases import UNBOUNDED, Case
+from symfric.bench.ocp_cases import UNBOUNDED, MoveCase
 from symfric.foundation.numeric import Array
 from symfric.foundation.status import Status
 
@@ -39,7 +39,7 @@ class Attempt:
     controls: Array
 
 
-Contender = Callable[[Case, float], Attempt]
+Contender = Callable[[MoveCase, float], Attempt]
 """Function (case, limit of time [s]) -> attempt."""
 
 
@@ -50,31 +50,31 @@ def _ipopt(limit: float) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def even(case: Case, claimed: float, status: object, controls: Any) -> Attempt:
+def even(case: MoveCase, claimed: float, status: object, controls: Any) -> Attempt:
     """Return an attempt on the grid of the case."""
     edges = np.linspace(0.0, case.T, case.intervals + 1)
     return Attempt(float(claimed), str(status), edges, np.ravel(controls).astype(float))
 
 
-def _sides(case: Case) -> list[Any]:
+def _sides(case: MoveCase) -> list[Any]:
     """Return the bounds of the states, as two arrays."""
     boxes = [case.bounds.get(i, UNBOUNDED) for i in range(len(case.states))]
     return list(np.array(boxes).T)
 
 
-def guesses_of(case: Case, count: int) -> Array:
+def guesses_of(case: MoveCase, count: int) -> Array:
     """Return the guess of the states at equal times, shape (count, states)."""
     return np.array([case.guess(s) for s in np.linspace(0, 1, count)])
 
 
-def equations(case: Case, width: float) -> ca.Function:
+def equations(case: MoveCase, width: float) -> ca.Function:
     """Return the Function (x, u) -> (x', running cost) with smooth friction."""
     x, u = ca.SX.sym("x", len(case.states)), ca.SX.sym("u")
     rate = case.smooth(ca, ca.vertsplit(x), u, width)
     return ca.Function("f", [x, u], [ca.vertcat(*rate), case.running(ca, ca.vertsplit(x), u)])
 
 
-def _final(case: Case, x: Any) -> Any:
+def _final(case: MoveCase, x: Any) -> Any:
     return case.final(ca, ca.vertsplit(x), 0.0)
 
 
@@ -82,7 +82,7 @@ PATIENCE = 4.0
 """Ratio of wall time, which limits symfric, to the processor time that limits Ipopt."""
 
 
-def symfric(case: Case, limit: float) -> Attempt:
+def symfric(case: MoveCase, limit: float) -> Attempt:
     """Return the solution of `ocp.solve` with its default settings, on intervals of its own."""
     found = solved(case.problem(), max_time=PATIENCE * limit)
     status = "verified" if found.verified else found.status.name
@@ -107,7 +107,7 @@ def held(solution: Solution) -> tuple[Array, Array]:
     return np.append(solution.t_control, solution.motions[0].phases[-1].end), np.asarray(controls)
 
 
-def opti(case: Case, limit: float, width: float) -> Attempt:
+def opti(case: MoveCase, limit: float, width: float) -> Attempt:
     """Return the solution by Radau collocation of degree 3 in CasADi's Opti, as in its examples."""
     o, f, N, n = ca.Opti(), equations(case, width), case.intervals, len(case.states)
     slopes, ends, weights = ca.collocation_coeff(ca.collocation_points(3, "radau"))
@@ -139,7 +139,7 @@ def opti(case: Case, limit: float, width: float) -> Attempt:
     return even(case, value(cost), o.stats()["return_status"], value(u))
 
 
-def rockit(case: Case, limit: float, width: float) -> Attempt:
+def rockit(case: MoveCase, limit: float, width: float) -> Attempt:
     """Return the solution by collocation with rockit; stages end where states are prescribed."""
     tool: Any = import_module("rockit")
     master, f, stages = tool.Ocp(), equations(case, width), list[tuple[Any, Any, Any, int]]()
@@ -176,7 +176,7 @@ def rockit(case: Case, limit: float, width: float) -> Attempt:
     return even(case, claimed, found.stats["return_status"], np.concatenate(controls))
 
 
-def nosnoc(case: Case, limit: float) -> Attempt:
+def nosnoc(case: MoveCase, limit: float) -> Attempt:
     """Return the solution by finite elements with switch detection, as in the examples of nosnoc.
 
     The settings are those of its cart-pole with friction: Radau IIA with 2 stages, 2 elements in
@@ -221,7 +221,7 @@ def nosnoc(case: Case, limit: float) -> Attempt:
     return even(case, found["cost_val"], found["status"].name, found["u_traj"])
 
 
-def do_mpc(case: Case, limit: float, width: float) -> Attempt:
+def do_mpc(case: MoveCase, limit: float, width: float) -> Attempt:
     """Return the solution by do-mpc, the first plan of a controller over the whole problem."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # do-mpc warns about each missing optional package

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from symfric.bench.ocp_cases import UNBOUNDED, Case
+from symfric.bench.ocp_cases import UNBOUNDED, MoveCase
 from symfric.foundation.numeric import Array
 
 RTOL = 1e-9
@@ -27,7 +27,7 @@ MOST = 5000
 """Largest number of events."""
 
 
-class Verdict(NamedTuple):
+class ControlVerdict(NamedTuple):
     """Cost of a control under exact friction, and its largest relative miss.
 
     The miss of a state is relative to its largest prescribed or reached magnitude. It includes
@@ -38,7 +38,7 @@ class Verdict(NamedTuple):
     miss: float
 
 
-def judged(case: Case, edges: Array, controls: Array, rtol: float = RTOL) -> Verdict:
+def judged(case: MoveCase, edges: Array, controls: Array, rtol: float = RTOL) -> ControlVerdict:
     """Return the verdict on a control that is constant between `edges`.
 
     It is NaN if the integration fails, a body lifts off, or events accumulate.
@@ -70,7 +70,7 @@ def judged(case: Case, edges: Array, controls: Array, rtol: float = RTOL) -> Ver
                 events += 1
             lifted = min(_loads(case, state.tolist()[:-1], u)) < 0.0
             if events > MOST or run.status < 0 or lifted:
-                return Verdict(math.nan, math.nan)
+                return ControlVerdict(math.nan, math.nan)
         for s, ends in case.ends.items():
             if abs(t - s * case.T) < 1e-9 * case.T:
                 for i, value in ends.items():
@@ -79,14 +79,16 @@ def judged(case: Case, edges: Array, controls: Array, rtol: float = RTOL) -> Ver
             low, high = case.bounds.get(i, UNBOUNDED)
             off[i] = max(off.get(i, 0.0), low - state[i], state[i] - high)
     miss = max((off[i] / largest[i] for i in off if off[i] > 0), default=0.0)
-    return Verdict(float(state[-1] + case.final(math, state[:-1].tolist(), 0.0)), float(miss))
+    return ControlVerdict(
+        float(state[-1] + case.final(math, state[:-1].tolist(), 0.0)), float(miss)
+    )
 
 
-def _loads(case: Case, x: Sequence[float], u: float) -> list[float]:
+def _loads(case: MoveCase, x: Sequence[float], u: float) -> list[float]:
     return case.normal(math, x, u)[: len(case.slips)]
 
 
-def _forces(case: Case, x: Sequence[float], u: float, modes: Sequence[int]) -> list[float]:
+def _forces(case: MoveCase, x: Sequence[float], u: float, modes: Sequence[int]) -> list[float]:
     """Return the friction forces; sticking ones solve v' = 0, in which F is affine."""
     loads = _loads(case, x, u)
     F = [mode * level[1] * N for mode, level, N in zip(modes, case.levels, loads, strict=True)]
@@ -108,7 +110,7 @@ def _solved(A: list[list[float]], b: list[float]) -> list[float]:
 
 
 def _run(
-    case: Case,
+    case: MoveCase,
     start: Array,
     u: float,
     modes: tuple[int, ...],
@@ -162,7 +164,11 @@ def _run(
 
 
 def _modes(
-    case: Case, state: Array, u: float, before: Sequence[int], leaving: frozenset[int] = frozenset()
+    case: MoveCase,
+    state: Array,
+    u: float,
+    before: Sequence[int],
+    leaving: frozenset[int] = frozenset(),
 ) -> tuple[int, ...]:
     """Return the modes at a state; contacts of `leaving` exceed their static level and slip."""
     x = state.tolist()[:-1]

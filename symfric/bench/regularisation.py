@@ -63,7 +63,7 @@ TITLE = "Error of smooth friction relative to dry friction"
 
 @final
 @dataclass(frozen=True, eq=False)
-class Case:
+class LawCase:
     """Law in a machine.
 
     Attributes:
@@ -118,21 +118,21 @@ def _lugre(kind: type[LuGre | LuGreNormalised]) -> Law:
 
 
 CASES = (
-    Case("rabinowicz brown_mcphee", _brown(0.15, 0.1), Rabinowicz, 20.0, _coulomb, True, ("x",)),
-    Case("rabinowicz lugre", _lugre(LuGre), Rabinowicz, 20.0, _falling, True, ("x",)),
-    Case("pendulum_box brown_mcphee", _brown(0.15, 0.1), PendulumBox, 15.0, _coulomb),
-    Case("pendulum_box lugre_normalised", _lugre(LuGreNormalised), PendulumBox, 15.0, _falling),
-    Case("four_mass coulomb", Coulomb(mu_d=0.1, v_eps=1e-2), FourMass, 4.0, _flat),
-    Case("four_mass brown_mcphee", _brown(0.12, 0.1), FourMass, 4.0),
+    LawCase("rabinowicz brown_mcphee", _brown(0.15, 0.1), Rabinowicz, 20.0, _coulomb, True, ("x",)),
+    LawCase("rabinowicz lugre", _lugre(LuGre), Rabinowicz, 20.0, _falling, True, ("x",)),
+    LawCase("pendulum_box brown_mcphee", _brown(0.15, 0.1), PendulumBox, 15.0, _coulomb),
+    LawCase("pendulum_box lugre_normalised", _lugre(LuGreNormalised), PendulumBox, 15.0, _falling),
+    LawCase("four_mass coulomb", Coulomb(mu_d=0.1, v_eps=1e-2), FourMass, 4.0, _flat),
+    LawCase("four_mass brown_mcphee", _brown(0.12, 0.1), FourMass, 4.0),
     # with 1 rad/s at the start the crank comes to rest
-    Case("slider_crank brown_mcphee", _brown(0.1, 0.08), partial(SliderCrank, omega=1.0), 5.0,
+    LawCase("slider_crank brown_mcphee", _brown(0.1, 0.08), partial(SliderCrank, omega=1.0), 5.0,
          _coulomb),
 )  # fmt: skip
 
 
 def bench(
     quick: bool = False,
-    cases: Sequence[Case] = CASES,
+    cases: Sequence[LawCase] = CASES,
     factors: Sequence[float] = HALF_DECADES,
     rtols: Sequence[float] = RTOLS,
     progress: Progress = None,
@@ -150,7 +150,7 @@ def bench(
 
 
 def _rows(
-    case: Case, factors: Sequence[float], rtols: Sequence[float], rounds: int, engine: str
+    case: LawCase, factors: Sequence[float], rtols: Sequence[float], rounds: int, engine: str
 ) -> Iterator[Found]:
     """Yield the rows of a case, tolerance by tolerance, width by width."""
     knob = regularisation("bench", case.law)
@@ -183,7 +183,7 @@ def _at(machine: Machine, knob: Regularisation, s: float, rtol: float, rounds: i
 
 
 def _reference(
-    case: Case, knob: Regularisation, machine: Machine, factors: Sequence[float]
+    case: LawCase, knob: Regularisation, machine: Machine, factors: Sequence[float]
 ) -> tuple[Sample, str, float]:
     """Return the motion with dry friction, its name, and its error."""
     if case.exact is not None:

@@ -35,7 +35,7 @@ DIGITS = 3
 """Significant digits of printed numbers that are not integers."""
 
 
-class Table(NamedTuple):
+class PrintedTable(NamedTuple):
     """Table to print."""
 
     title: str
@@ -102,11 +102,13 @@ class Report:
             self.notes.append("Interrupted: the other measurements were not made.")
         return self
 
-    def shown(self) -> Iterator[Table | str]:
+    def shown(self) -> Iterator[PrintedTable | str]:
         """Yield the tables and sentences to print, with numbers rounded to 3 digits."""
         for title, rows in self.tables.items():
             head = list(dict.fromkeys(chain.from_iterable(rows)))
-            yield Table(title, head, [[_short(row.get(c, "")) for c in head] for row in rows])
+            yield PrintedTable(
+                title, head, [[_short(row.get(c, "")) for c in head] for row in rows]
+            )
         yield from self.notes
 
     def to_dict(self) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from symfric.foundation.lazy import load_lazily
 if TYPE_CHECKING:
     from symfric.choice.friction import Friction as Friction
     from symfric.choice.nature import NEEDS as NEEDS
-    from symfric.choice.ranking import Row as Row
+    from symfric.choice.ranking import RankedLaw as RankedLaw
     from symfric.choice.select import Choice as Choice
     from symfric.choice.select import select as select
     from symfric.choice.work_precision import WorkPoint as WorkPoint

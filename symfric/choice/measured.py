@@ -15,7 +15,7 @@ from symfric.choice.continuation import AtEqualError, Budget, Wanted, at_equal_e
 from symfric.choice.friction import Friction
 from symfric.choice.machine import FAILURES, OWN, Candidate, Reference, candidate, quiet_run
 from symfric.choice.nature import lacking
-from symfric.choice.ranking import FAILED, INACCURATE, LACKING, RANKED, REFUSED, Row, place
+from symfric.choice.ranking import FAILED, INACCURATE, LACKING, RANKED, REFUSED, RankedLaw, place
 from symfric.choice.smoothing import MARGIN, OF_BRISTLES, SmoothingStudy
 from symfric.codegen.blocks.block import Block
 from symfric.codegen.blocks.from_model import plant_block
@@ -38,7 +38,7 @@ CHUNK = 1000
 
 @final
 @dataclass(frozen=True, eq=False)
-class Motion:
+class ReferenceMotion:
     """Motion that fixed steps must follow.
 
     Attributes:
@@ -55,7 +55,7 @@ class Motion:
 
 
 def largest(
-    machine: Machine, model: Model, method: str, motion: Motion, share: float
+    machine: Machine, model: Model, method: str, motion: ReferenceMotion, share: float
 ) -> tuple[float | None, str]:
     """Return the largest step [s] with which the plant follows the motion, or None and the reason.
 
@@ -95,7 +95,7 @@ def _step(block: Block) -> ca.Function:
 
 
 def _follows(
-    step: ca.Function, h: float, block: Block, machine: Machine, motion: Motion,
+    step: ca.Function, h: float, block: Block, machine: Machine, motion: ReferenceMotion,
     share: float,
 ) -> bool:  # fmt: skip
     """Return True if the motion in steps of `h` [s] is finite and within `share` of `motion`."""
@@ -165,12 +165,12 @@ class Task:
         return Wanted(self.accuracy, self.control if self.fixed else 0.0)
 
 
-def best_form(task: Task, name: str, laws: Sequence[Law]) -> Row:
+def best_form(task: Task, name: str, laws: Sequence[Law]) -> RankedLaw:
     """Return the row of the first ranked form of a law, or of its best form if none is ranked.
 
     If a form lacks a required phenomenon, the other forms lack it as well and are not measured.
     """
-    rows: list[Row] = []
+    rows: list[RankedLaw] = []
     for law in laws:
         rows.append(measured(task, name, law))
         if rows[-1].standing in (RANKED, LACKING) or rows[-1].spent:
@@ -178,16 +178,16 @@ def best_form(task: Task, name: str, laws: Sequence[Law]) -> Row:
     return min(rows, key=place)
 
 
-def measured(task: Task, name: str, law: Law) -> Row:
+def measured(task: Task, name: str, law: Law) -> RankedLaw:
     """Return the row of `law`; errors of the law or of the machine become the reason."""
     known, hard = nature.physical(law)
     operations, why = nature.c_operations(law)
-    row = Row(
+    row = RankedLaw(
         name, REFUSED, phenomena=tuple(phenomena(law)), states=len(law.states),
         parameters=len(known), hard=hard, form=nature.form(law), c_operations=operations, c_why=why,
         smoothness=nature.smoothness(law),
     )  # fmt: skip
-    tried = list[tuple[Row, Candidate, SmoothingStudy]]()
+    tried = list[tuple[RankedLaw, Candidate, SmoothingStudy]]()
     for bristles in OF_BRISTLES if law.states else OF_BRISTLES[:1]:
         try:
             held = candidate(task.machine, law, task.frictions, task.load, task.own, bristles)
@@ -226,7 +226,7 @@ def _from_own(task: Task, held: Candidate, runs: Budget) -> Task:
     return replace(task, reference=replace(OWN, motion=run.motion, size=run.size))
 
 
-def _by_data(misfits: dict[str, float] | None, row: Row) -> Row:
+def _by_data(misfits: dict[str, float] | None, row: RankedLaw) -> RankedLaw:
     """Return the row with its error from data; it is ranked if this error is near the smallest."""
     if misfits is None or not row.attempts:
         return row
@@ -238,7 +238,9 @@ def _by_data(misfits: dict[str, float] | None, row: Row) -> Row:
     return row
 
 
-def _placed(task: Task, held: Candidate, levels: SmoothingStudy, runs: Budget, row: Row) -> Row:
+def _placed(
+    task: Task, held: Candidate, levels: SmoothingStudy, runs: Budget, row: RankedLaw
+) -> RankedLaw:
     """Return the row with the measurements and the standing.
 
     Raises:
@@ -322,7 +324,7 @@ def _timed(task: Task, law: Law, at: AtEqualError, runs: Budget) -> float:
     return best
 
 
-def _stepped(task: Task, held: Candidate, levels: SmoothingStudy, row: Row) -> Row:
+def _stepped(task: Task, held: Candidate, levels: SmoothingStudy, row: RankedLaw) -> RankedLaw:
     """Return the row with the largest fixed steps, for the law as smooth as `control` allows.
 
     If the law does not satisfy `control` at any smoothing, the smoothing of `row` is used.
@@ -337,7 +339,7 @@ def _stepped(task: Task, held: Candidate, levels: SmoothingStudy, row: Row) -> R
         return replace(row, fixed_why=short(problem), explicit_why=short(problem))
     names = positions(model, law)
     t = np.linspace(0.0, machine.t_end, run.motion.shape[1])
-    motion = Motion(names, t, run.motion, run.size)
+    motion = ReferenceMotion(names, t, run.motion, run.size)
     implicit = largest(machine, model, "backward_euler", motion, task.control)
     explicit = largest(machine, model, "dopri5", motion, task.control)
     return replace(

@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.transforms import Bbox
 
 from symfric.choice.nature import NEEDS
-from symfric.choice.ranking import STANDING_TEXTS, Ranking, Row, interruption, number
+from symfric.choice.ranking import STANDING_TEXTS, RankedLaw, Ranking, interruption, number
 from symfric.foundation.panels import blank, dressed, save
 from symfric.foundation.shown import data_uri
 from symfric.foundation.style import MARKERS, colour
@@ -79,13 +79,13 @@ def plot_choice(choice: Ranking, path: str | Path | None = None, wide: bool = Tr
     return save(figure, path)
 
 
-def _kind(row: Row) -> int:
+def _kind(row: RankedLaw) -> int:
     """Return the index in `KINDS` of the most demanding phenomenon of a law."""
     codes = [*GROUPS]
     return next((k for k, code in enumerate(codes) if code in row.phenomena), len(codes))
 
 
-def _point(axis: Axes, row: Row, y: float, size: float) -> None:
+def _point(axis: Axes, row: RankedLaw, y: float, size: float) -> None:
     """Draw the marker of a law at its work; filled if it is ranked, otherwise hollow."""
     k = _kind(row)
     axis.plot(
@@ -94,7 +94,7 @@ def _point(axis: Axes, row: Row, y: float, size: float) -> None:
     )  # fmt: skip
 
 
-def _plane(axis: Axes, choice: Ranking) -> list[Row]:
+def _plane(axis: Axes, choice: Ranking) -> list[RankedLaw]:
     """Draw error against work, and return the rows of the laws within the plotted range."""
     rows = [row for row in choice.placed if 0.0 < row.error < 1e3]
     for row in rows:
@@ -111,7 +111,9 @@ def _plane(axis: Axes, choice: Ranking) -> list[Row]:
     return rows
 
 
-def _label(figure: Figure, axis: Axes, named: Sequence[Row], rows: Sequence[Row]) -> None:
+def _label(
+    figure: Figure, axis: Axes, named: Sequence[RankedLaw], rows: Sequence[RankedLaw]
+) -> None:
     """Write names next to their points; omit names that would overlap in every position."""
     figure.draw_without_rendering()
     half = 2.5 * figure.dpi / 72  # half width of a marker [pixel]
@@ -134,7 +136,7 @@ def _label(figure: Figure, axis: Axes, named: Sequence[Row], rows: Sequence[Row]
             text.remove()
 
 
-def _list(axis: Axes, named: Sequence[Row], milliseconds: float) -> None:
+def _list(axis: Axes, named: Sequence[RankedLaw], milliseconds: float) -> None:
     """Draw the work of each law by rank; the label states that a million takes `milliseconds`."""
     for y, row in enumerate(named):
         _point(axis, row, y, 4.5)
@@ -247,7 +249,7 @@ def _placed(choice: Ranking) -> str:
     )
 
 
-def _cells(row: Row) -> str:
+def _cells(row: RankedLaw) -> str:
     """Return the HTML cells of a law in the order of `COLUMNS`."""
 
     def known(value: float | None, form: str) -> str:

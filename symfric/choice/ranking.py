@@ -25,7 +25,7 @@ FASTER = 1.25
 
 @final
 @dataclass(frozen=True)
-class Row:
+class RankedLaw:
     """Measurements of one law.
 
     Attributes:
@@ -113,12 +113,12 @@ class Row:
         return json_data(asdict(self) | {"work": self.work})
 
 
-def ordered(rows: Iterable[Row]) -> list[Row]:
+def ordered(rows: Iterable[RankedLaw]) -> list[RankedLaw]:
     """Return the rows with ranks, sorted from best to worst: ranked laws by work, others by error.
 
     The order does not depend on measured times and is therefore reproducible.
     """
-    result = list[Row]()
+    result = list[RankedLaw]()
     head, rank = None, 0
     for row in sorted(rows, key=place):
         alike = head is not None and place(head)[:2] == place(row)[:2]
@@ -128,7 +128,7 @@ def ordered(rows: Iterable[Row]) -> list[Row]:
     return result
 
 
-def place(row: Row) -> tuple[int, float, float, str]:
+def place(row: RankedLaw) -> tuple[int, float, float, str]:
     """Return the key by which rows are sorted, with errors rounded to one digit."""
     error = float(f"{row.error:.0e}") if isfinite(row.error) else inf
     return ORDER.index(row.standing), 0.0 if row.ranked else error, row.work or inf, row.law
@@ -159,17 +159,17 @@ class Ranking:
     uncertain: float
     control: float
     t_end: float
-    rows: tuple[Row, ...]
+    rows: tuple[RankedLaw, ...]
     wall_s: float
     unmeasured: tuple[str, ...] = ()
 
-    def __getitem__(self, law: str) -> Row:
+    def __getitem__(self, law: str) -> RankedLaw:
         """Return the row of a law."""
         rows = {row.law: row for row in self.rows}
         check_names("choice", [law], rows)
         return rows[law]
 
-    def __iter__(self) -> Iterator[Row]:
+    def __iter__(self) -> Iterator[RankedLaw]:
         return iter(self.rows)
 
     @property
@@ -178,17 +178,17 @@ class Ranking:
         return bool(self.unmeasured)
 
     @property
-    def placed(self) -> tuple[Row, ...]:
+    def placed(self) -> tuple[RankedLaw, ...]:
         """Rows of all laws that run, by rank."""
         return tuple(row for row in self.rows if row.rank)
 
     @property
-    def ranked(self) -> tuple[Row, ...]:
+    def ranked(self) -> tuple[RankedLaw, ...]:
         """Rows of laws that meet all requirements, sorted by work."""
         return tuple(row for row in self.rows if row.ranked)
 
     @property
-    def best(self) -> Row | None:
+    def best(self) -> RankedLaw | None:
         """Row of the first ranked law; None if no law is ranked."""
         return next(iter(self.ranked), None)
 
@@ -226,7 +226,7 @@ LEFT_OUT = (
 """Standings of laws that are not ranked, and their description in the verdict."""
 
 
-def _simulation(ranked: Sequence[Row], shown: str) -> str:
+def _simulation(ranked: Sequence[RankedLaw], shown: str) -> str:
     """Recommend the law with the least work; mention ties and a law that takes less time."""
     best = ranked[0]
     text = (
@@ -245,7 +245,7 @@ def _simulation(ranked: Sequence[Row], shown: str) -> str:
     return f"{text}."
 
 
-def _smooth(ranked: Sequence[Row]) -> str:
+def _smooth(ranked: Sequence[RankedLaw]) -> str:
     """Recommend the least steep law with second derivatives, or the first one with states."""
     smooth = [row for row in ranked if row.smoothness in ("C2", "C∞")]
     if not smooth:
@@ -263,7 +263,7 @@ def _smooth(ranked: Sequence[Row]) -> str:
     )
 
 
-def _controller(ranked: Sequence[Row], control: float) -> str:
+def _controller(ranked: Sequence[RankedLaw], control: float) -> str:
     """Recommend the law with the fewest operations per second of motion in fixed steps."""
     if not any(row.fixed_step or row.fixed_why for row in ranked):
         return "Controller: fixed steps were not measured."
@@ -350,7 +350,7 @@ def interruption(choice: Ranking) -> list[str]:
     return [text] if choice.interrupted else []
 
 
-def _line(row: Row, tie: str, cores: bool) -> str:
+def _line(row: RankedLaw, tie: str, cores: bool) -> str:
     counts = f"{row.core:.0f}" if isfinite(row.core) else "-"
     if not cores:
         counts = "-" if row.c_operations is None else str(row.c_operations)

@@ -15,7 +15,7 @@ from symfric.choice.friction import Friction
 from symfric.choice.machine import FAILURES, OWN, frictions_of, load_of, reference_of
 from symfric.choice.measured import Task, best_form
 from symfric.choice.nature import forms, needed
-from symfric.choice.ranking import FAILED, Ranking, Row, lines, ordered
+from symfric.choice.ranking import FAILED, RankedLaw, Ranking, lines, ordered
 from symfric.figures.regularisation import Measure, machine_of
 from symfric.foundation import checks
 from symfric.foundation.files import write_table, write_text
@@ -88,7 +88,7 @@ class Choice(Ranking):
         write_text(path, json.dumps(self.to_dict(), indent=2, ensure_ascii=False) + "\n")
 
 
-def flat(row: Row) -> dict[str, Any]:
+def flat(row: RankedLaw) -> dict[str, Any]:
     """Return a row without nested values."""
     data = row.to_dict()
     del data["curve"]
@@ -214,7 +214,7 @@ def select(
         machine, compared, words, frictions, load, accuracy, control, fitted,
         checks.flag(f"{where}: fixed_steps", fixed_steps), max(1, round(effort * RUN)), misfits,
     )  # fmt: skip
-    rows: list[Row] = []
+    rows: list[RankedLaw] = []
     with suppress(KeyboardInterrupt):
         for row in _rows(task, candidates, count):
             rows.append(row)
@@ -251,7 +251,7 @@ def laws_of(where: str, laws: Candidates | None) -> Forms:
     return found
 
 
-def _rows(task: Task, laws: Forms, workers: int) -> Iterator[Row]:
+def _rows(task: Task, laws: Forms, workers: int) -> Iterator[RankedLaw]:
     """Yield the rows; with several workers each law has a process, and rows come as they finish.
 
     The processes are forked, since functions defined in a user's file cannot be sent.
@@ -262,6 +262,8 @@ def _rows(task: Task, laws: Forms, workers: int) -> Iterator[Row]:
     names, tasks = [*laws], enumerate(laws.items())
     for number, row in outcomes(lambda at: best_form(task, *at), tasks, workers, start="fork"):
         if isinstance(row, Crashed):
-            yield Row(names[number], FAILED, f"its process ended with {row.how}: {row.last_line}")
+            yield RankedLaw(
+                names[number], FAILED, f"its process ended with {row.how}: {row.last_line}"
+            )
         else:
             yield row

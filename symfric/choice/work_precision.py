@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from symfric.foundation import checks
 from symfric.foundation.files import write_table
 from symfric.foundation.programs import find_compiler
-from symfric.foundation.shown import Showing, Shown, Table, among
+from symfric.foundation.shown import Showing, Shown, TextTable, among
 from symfric.foundation.status import SolveError, Status
 from symfric.integrator import Input, Trajectory, simulate
 from symfric.integrator.methods.tableaux import ADAPTIVE
@@ -142,7 +142,7 @@ class WorkPrecision(Showing):
                 f"error: largest error relative to the largest value, of {among(self.signals)}",
                 f"reference: {self.reference}, with an error of {self.reference_error:.0e}",
             ),
-            Table(header, tuple(rows), numbers=tuple(range(1, len(header)))),
+            TextTable(header, tuple(rows), numbers=tuple(range(1, len(header)))),
             tuple(said),
         )
 

@@ -26,11 +26,11 @@ from symfric.foundation.files import check_folder, make_folder
 from symfric.foundation.parameters import check_names
 
 if TYPE_CHECKING:
-    from symfric.bench.report import Table
+    from symfric.bench.report import PrintedTable
     from symfric.gallery.rendering import Gallery
     from symfric.stress.campaign import Report
     from symfric.stress.cases import Case
-    from symfric.stress.judge import Verdict
+    from symfric.stress.judge import Judgement
 
 EVERY = 60.0
 """Interval between updates of the files of stress tests [s]."""
@@ -90,7 +90,7 @@ def bench(
         raise typer.Exit(1)
 
 
-def show(shown: "Iterable[Table | str]") -> None:
+def show(shown: "Iterable[PrintedTable | str]") -> None:
     """Print tables and sentences."""
     for item in shown:
         if isinstance(item, str):
@@ -247,7 +247,7 @@ def show_report(report: "Report") -> None:
         output.show(f"Interrupted: {asked - done} of {asked} cases were not run.")
 
 
-def show_verdict(case: "Case", verdict: "Verdict") -> None:
+def show_verdict(case: "Case", verdict: "Judgement") -> None:
     """Print one case and its verdict."""
     group = f" ({verdict.group})" if verdict.group else ""
     output.show(

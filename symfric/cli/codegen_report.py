@@ -8,7 +8,7 @@ from typing import Any
 from symfric.cli import output
 from symfric.codegen import Check, Generated, Proof, Verification
 from symfric.codegen.guards import TOP
-from symfric.embedded import Measured, StepError
+from symfric.embedded import BlockMeasurement, StepError
 from symfric.embedded.measure import REGIMES
 
 
@@ -16,7 +16,7 @@ def report(
     law: str,
     generated: Generated,
     verification: Verification,
-    measured: Sequence[Measured],
+    measured: Sequence[BlockMeasurement],
     proofs: Sequence[Proof],
     errors: Sequence[StepError],
     json: str | None,
@@ -95,7 +95,7 @@ def compared(check: Check) -> str:
     return "bit for bit equal" if check.ulp == 0 else f"{check.ulp} ulp apart"
 
 
-def show_sizes(generated: Generated, measured: Sequence[Measured]) -> None:
+def show_sizes(generated: Generated, measured: Sequence[BlockMeasurement]) -> None:
     """Print memory on this machine (from `size`, -fstack-usage) and cost on other cores (QEMU)."""
     rows: list[tuple[str | float, ...]] = []
     for real in generated.reals:

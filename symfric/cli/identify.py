@@ -19,7 +19,7 @@ from identification.residuals.shooting import Shooting
 from identification.result.fitted import Fitted
 from identification.robot.friction import USUAL
 from identification.robot.identify import identify_robot
-from identification.select import INTERRUPTED, Ranking, select
+from identification.select import INTERRUPTED, FitRanking, select
 from identification.unknowns.spec import above, linear, log, tied
 from identification.verdict.profile import Profile
 from symfric import Drive, SolveError, Status
@@ -227,7 +227,7 @@ def identify(
     if profiles:
         one = Fit(chosen, first, records, **request).prepared()
         check_names("--profile", profiles, one.task.unknowns.fitted)
-    ranking: Ranking | None = None
+    ranking: FitRanking | None = None
     with output.progress(f"identify {' and '.join(laws)}") as tell, pool as executor:
         how: dict[str, Any] = {"executor": executor, "progress": tell}
         if len(laws) > 1:
@@ -282,7 +282,7 @@ def judged(
     return fit, profiles, failed
 
 
-def refuse(fit: Fitted, ranking: Ranking | None, failed: Sequence[str]) -> None:
+def refuse(fit: Fitted, ranking: FitRanking | None, failed: Sequence[str]) -> None:
     """Raise an error if the result is meaningless or incomplete.
 
     Raises:

@@ -37,7 +37,7 @@ RARE = 0.01
 
 @final
 @dataclass(frozen=True, eq=False)
-class Run:
+class ComparedRun:
     """One sequence of inputs, run by C and by CasADi.
 
     Attributes:

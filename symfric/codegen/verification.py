@@ -9,7 +9,7 @@ from typing import Any, final
 import numpy as np
 
 from symfric.codegen.blocks.block import Block, CBlock
-from symfric.codegen.compared import TOLERANCE, Run, ulp
+from symfric.codegen.compared import TOLERANCE, ComparedRun, ulp
 from symfric.codegen.generated import Generated
 from symfric.codegen.guards import HUGE, STEP_SIZE, Status, parameter_range, range_of
 from symfric.codegen.runner import compile_object, compiled, needed_symbols, run_c, run_vm
@@ -233,7 +233,7 @@ def _sequences(block: Block, guards: bool) -> Sequences:
 
 
 def _check(generated: Generated, c: CBlock, compiler: Compiler, sequences: Sequences) -> Check:
-    is_float, runs = c.real.size == 4, list[Run]()
+    is_float, runs = c.real.size == 4, list[ComparedRun]()
     with TemporaryDirectory(prefix="symfric-") as name:
         target = Path(name) / f"{c.name}.o"
         warnings = compile_object(compiler, generated.source(c.real.name), target)
@@ -242,7 +242,7 @@ def _check(generated: Generated, c: CBlock, compiler: Compiler, sequences: Seque
             rows = run_c(c, executable, inputs, parameters)
             states = rows[:, : len(c.block.states)] if is_float else None
             expected = run_vm(c, inputs, states, parameters)
-            runs.append(Run(c, inputs, parameters, rows, expected))
+            runs.append(ComparedRun(c, inputs, parameters, rows, expected))
         needed = needed_symbols(target)
     called = {call for routine in routines(c) for call in routine.calls}
     called |= {"sincos"} if {"sin", "cos"} <= called else set()

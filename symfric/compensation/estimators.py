@@ -270,7 +270,7 @@ LEAST = 1e-10
 """Smallest diagonal element, relative to the deviation at the start."""
 
 
-class Measured(NamedTuple):
+class MeasurementUpdate(NamedTuple):
     """Factor after a measurement, its gain (n, 1), and the variance of its residual."""
 
     W: ca.SX
@@ -312,7 +312,7 @@ def variances(W: ca.SX) -> ca.SX:
     return ca.SX(ca.sum2(W * W))
 
 
-def measured(W: ca.SX, row: ca.SX, variance: ca.SX | float) -> Measured:
+def measured(W: ca.SX, row: ca.SX, variance: ca.SX | float) -> MeasurementUpdate:
     """Return the update by one measurement `row` x + noise.
 
     Args:
@@ -328,7 +328,7 @@ def measured(W: ca.SX, row: ca.SX, variance: ca.SX | float) -> Measured:
         for i in range(j + 1):
             after[i, j] = keep * W[i, j] - share * gain[i]
             gain[i] += f[j] * W[i, j]
-    return Measured(after, gain / total, total)
+    return MeasurementUpdate(after, gain / total, total)
 
 
 def moved(W: ca.SX, A: ca.SX, noise: ca.SX) -> ca.SX:

@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.dynamics.equations import DEPENDENT, Equations
+from symfric.dynamics.equations import DEPENDENT, ModelEquations
 from symfric.foundation.numeric import Array
 
 ITERATIONS, HALVINGS = 50, 10
@@ -22,10 +22,10 @@ LEVEL = 1e-9
 MANY = 3
 """Largest number of contacts with modes for which all combinations are tried."""
 SLIP, FORCE, UP = range(3)
-"""Columns of `Equations.contacts`; the last one, after UP, is the level against -F."""
+"""Columns of `ModelEquations.contacts`; the last one, after UP, is the level against -F."""
 
 
-class Condition(NamedTuple):
+class LinearCondition(NamedTuple):
     """Linear condition W (y - y_0) = 0 in addition to the equations; W has the shape (k, n)."""
 
     W: Array
@@ -33,8 +33,8 @@ class Condition(NamedTuple):
 
 
 def settled(
-    eq: Equations, y: Array, d: Array, more: Condition | None = None, unloaded: Sequence[int] = (),
-    reach: Array | None = None,
+    eq: ModelEquations, y: Array, d: Array, more: LinearCondition | None = None,
+    unloaded: Sequence[int] = (), reach: Array | None = None,
 ) -> tuple[Array, int] | None:  # fmt: skip
     """Return a solution near `y` and the dimension of its set; None if there is none.
 
@@ -47,7 +47,7 @@ def settled(
 
 
 def _settled(
-    eq: Equations, y: Array, d: Array, more: Condition | None, unloaded: Sequence[int],
+    eq: ModelEquations, y: Array, d: Array, more: LinearCondition | None, unloaded: Sequence[int],
     reach: Array,
 ) -> tuple[Array, int] | None:  # fmt: skip
     own = np.setdiff1d(np.arange(y.size), eq.modes)
@@ -81,7 +81,7 @@ def _settled(
     return y, own.size - rank - eq.cyclic.size
 
 
-def rows_at_rest(eq: Equations, y: Array, d: Array) -> tuple[Array, Array]:
+def rows_at_rest(eq: ModelEquations, y: Array, d: Array) -> tuple[Array, Array]:
     """Return the residuals of an equilibrium, and their derivatives by y and by d in columns."""
     f, C, slips = (value.full().ravel() for value in eq.values(y, d))
     every = [slope.full() for slope in eq.slopes(y, d)]
@@ -95,7 +95,7 @@ def rows_at_rest(eq: Equations, y: Array, d: Array) -> tuple[Array, Array]:
 
 
 def _rows(
-    eq: Equations, y: Array, d: Array, more: Condition | None, unloaded: Sequence[int]
+    eq: ModelEquations, y: Array, d: Array, more: LinearCondition | None, unloaded: Sequence[int]
 ) -> tuple[Array, Array]:
     """Return the residuals of an equilibrium and their derivatives by y."""
     r, of_both = rows_at_rest(eq, y, d)
@@ -110,7 +110,7 @@ def _rows(
     return np.concatenate(rows), np.vstack(slopes)
 
 
-def with_modes(eq: Equations, y: Array, d: Array) -> tuple[Array, int] | None:
+def with_modes(eq: ModelEquations, y: Array, d: Array) -> tuple[Array, int] | None:
     """Return a solution near `y` with consistent modes and its dimension; None without one.
 
     A sliding contact has a sliding velocity in the direction of its mode, and a contact at rest,
@@ -130,7 +130,7 @@ def with_modes(eq: Equations, y: Array, d: Array) -> tuple[Array, int] | None:
     return None
 
 
-def _candidates(eq: Equations, y: Array, d: Array) -> Iterator[tuple[Array, int]]:
+def _candidates(eq: ModelEquations, y: Array, d: Array) -> Iterator[tuple[Array, int]]:
     """Yield solutions with the modes of `y`: near it, then without forces in resting contacts."""
     for reach in (eq.reach, eq.scale):
         found = settled(eq, y, d, reach=reach)
@@ -152,18 +152,18 @@ def _choices(modes: Array) -> Iterator[Sequence[float]]:
     yield from sorted(every, key=lambda choice: float(np.abs(modes - choice).sum()))
 
 
-def slowest(eq: Equations) -> Array:
+def slowest(eq: ModelEquations) -> Array:
     """Return the sliding velocity of each contact with modes that counts as zero."""
     used = ca.DM(eq.slopes.sparsity_out(2), 1).full() != 0
     return STILL * np.array([max(eq.scale[row], default=1.0) for row in used])
 
 
-def _rests(eq: Equations, rows: Array) -> NDArray[np.bool_]:
+def _rests(eq: ModelEquations, rows: Array) -> NDArray[np.bool_]:
     """Return True for each of the `rows` of contacts without sliding velocity."""
     return np.abs(rows[:, SLIP]) <= STILL * eq.scale[: len(eq.model.x)].max(initial=0.0)
 
 
-def _consistent(eq: Equations, y: Array, d: Array, still: Array) -> bool:
+def _consistent(eq: ModelEquations, y: Array, d: Array, still: Array) -> bool:
     """Return True if all modes of contacts agree with sliding velocities and forces."""
     rows = eq.contacts(y, d).full()
     force, level = rows[:, FORCE], np.where(rows[:, FORCE] > 0, rows[:, UP], rows[:, UP + 1])

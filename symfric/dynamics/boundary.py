@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from symfric.dynamics.branch import Branch, Special
 from symfric.dynamics.continuation import checked_span
-from symfric.dynamics.curve import Equations as Curve
+from symfric.dynamics.curve import CurveEquations as Curve
 from symfric.dynamics.curve import Node, at_edge, corrected, followed
 from symfric.dynamics.curve import tangent as direction
 from symfric.dynamics.equations import equations, tangent
@@ -88,7 +88,7 @@ class Boundary(Showing):
 
 @final
 @dataclass(frozen=True, eq=False)
-class Points(Curve):
+class BoundaryEquations(Curve):
     """Equations of a boundary; z = (y, first parameter, second parameter)."""
 
     rest: Equilibria
@@ -191,7 +191,7 @@ def _reason(end: list[Array], span: tuple[float, float], points: int) -> str:
 
 def _start(
     branch: Branch, special: Special, parameter: str, span: tuple[float, float]
-) -> tuple[Points, Node]:
+) -> tuple[BoundaryEquations, Node]:
     """Return the equations of a boundary and the node at a special point."""
     model, u = branch.model, branch.u
     eq, p = equations("boundary", model), branch.p | {branch.parameter: special.value}
@@ -203,13 +203,18 @@ def _start(
     first, second = order.index(branch.parameter), order.index(parameter)
     every = np.concatenate([scale, [reach, width]])
     rest = Equilibria(eq, d, (first, second), every, 1e-11)
-    curve = Points(rest, special.kind == "Hopf", every, 1e-10)
+    curve = BoundaryEquations(rest, special.kind == "Hopf", every, 1e-10)
     z = np.concatenate([y, [special.value, p[parameter]]])
     return curve, corrected(curve, z, np.eye(z.size)[-1])[0]
 
 
 def _within(
-    curve: Points, node: Node, tau: Array, span: tuple[float, float], step: float, points: int
+    curve: BoundaryEquations,
+    node: Node,
+    tau: Array,
+    span: tuple[float, float],
+    step: float,
+    points: int,
 ) -> Iterator[Node]:
     """Yield the nodes of a curve up to the end of the range of the second parameter."""
     steps = followed(curve, node, tau, step, lambda _, __: None, lambda _: np.inf)

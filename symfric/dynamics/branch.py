@@ -13,7 +13,7 @@ from symfric.dynamics.orbit import PeriodicOrbit, guessed, periodic_orbit
 from symfric.foundation import checks
 from symfric.foundation.numeric import Array
 from symfric.foundation.parameters import check_names
-from symfric.foundation.shown import Showing, Shown, Table
+from symfric.foundation.shown import Showing, Shown, TextTable
 from symfric.integrator import Ensemble, Input
 from symfric.model import Model
 from symfric.results.stored import Format
@@ -151,12 +151,12 @@ class Branch(Showing):
         Raises:
             ValueError: an unknown state, or an ensemble that does not vary the parameter.
         """
-        from symfric.dynamics.pictures import Curve, bifurcation  # noqa: PLC0415  (slow to import)
+        from symfric.dynamics.pictures import Plotted, bifurcation  # noqa: PLC0415  (slow to import)
 
         names = [v.name for v in self.model.x]
         check_names(f"branch of '{self.model.name}': plot", [state], names)
         i = names.index(state)
-        curves = list[Curve]()
+        curves = list[Plotted]()
         for b in (self, *others):
             order = np.argsort(b.values, kind="stable") if not b.of_orbits else slice(None)
             at = [min(s.index, b.high.shape[0] - 1) for s in b.special]
@@ -164,7 +164,7 @@ class Branch(Showing):
                 (s.kind, s.value, float(b.high[k, i])) for s, k in zip(b.special, at, strict=True)
             ]
             rows = b.values[order], b.low[order, i], b.high[order, i], b.stable[order]
-            curves.append(Curve(b.content, *rows, special))
+            curves.append(Plotted(b.content, *rows, special))
         (free,) = (v for v in self.model.p if v.name == self.parameter)
         labels = f"{self.parameter} [{free.unit}]", f"{state} [{self.model.x[i].unit}]"
         points = [self._points(state, study) for study in runs]
@@ -193,7 +193,7 @@ class Branch(Showing):
             (s.kind, f"{s.value:.10g}", f"{s.period:.8g}" * bool(s.period)) for s in self.special
         ]
         header = ("special point", self.parameter, "period [s]")
-        table = Table(header, tuple(rows), numbers=(1, 2)) if rows else Table((), ())
+        table = TextTable(header, tuple(rows), numbers=(1, 2)) if rows else TextTable((), ())
         return Shown(f"branch of '{self.model.name}'", tuple(lines), table)
 
     def to_dict(self) -> dict[str, Any]:

@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 
 from symfric.dynamics.branch import Branch, Special
-from symfric.dynamics.curve import Node, Step, at_edge, corrected, followed, tangent
+from symfric.dynamics.curve import ContinuationStep, Node, at_edge, corrected, followed, tangent
 from symfric.dynamics.equilibrium import Equilibrium
 from symfric.dynamics.families import Equilibria, Family, Orbits, Trace
 from symfric.dynamics.orbit import PeriodicOrbit
-from symfric.dynamics.shooting import Shooting
+from symfric.dynamics.shooting import OrbitShooting
 from symfric.dynamics.sticking import Near, restarted, same_sequence
 from symfric.foundation import checks
 from symfric.foundation.numeric import Array
@@ -113,7 +113,7 @@ def orbits_from(
         raise checks.refused(f"{where}: hopf", "a Hopf point, branch.located('Hopf')[0]", hopf)
     span = checked_span(where, model, between, hopf.value, branch.parameter)
     nominal = np.maximum(model.nominal("x"), np.abs(hopf.x))
-    problem = Shooting(
+    problem = OrbitShooting(
         model, branch.u, (branch.parameter,), nominal, np.ones(nominal.size), rtol, driven=False
     )
     scale = np.concatenate([nominal, [hopf.period, span[1] - span[0]]])
@@ -159,7 +159,7 @@ def _orbits(
     reach = [start.run.extremes[v.name] for v in model.x]
     scale = np.maximum([high - low for low, high in reach], 1e-9 * model.nominal("x"))
     signs = np.ones(scale.size)
-    problem = Shooting(model, start.u, (name,), scale, signs, rtol, driven=start.driven)
+    problem = OrbitShooting(model, start.u, (name,), scale, signs, rtol, driven=start.driven)
     z = np.array([*start.x.values(), start.period, start.p[name]])
     every = np.concatenate([scale, [start.period, span[1] - span[0]]])
     return Orbits(problem, start.p, every, 10 * rtol), z
@@ -202,7 +202,7 @@ def _traced(
 
 def _steps(
     curve: Family, node: Node, tau: Array, span: tuple[float, float], step: float, trace: Trace
-) -> Iterator[Step]:
+) -> Iterator[ContinuationStep]:
     """Yield steps along the curve, also across changes of stick and slip."""
     known = {curve.kind_of(node)}
     while True:

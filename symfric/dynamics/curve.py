@@ -58,7 +58,7 @@ class Node(NamedTuple):
     content: Any
 
 
-class Equations(ABC):
+class CurveEquations(ABC):
     """Equations r(z) = 0 of a curve.
 
     Attributes:
@@ -85,7 +85,7 @@ class Equations(ABC):
         return self, node
 
 
-def tangent(curve: Equations, node: Node, along: Array) -> Array:
+def tangent(curve: CurveEquations, node: Node, along: Array) -> Array:
     """Return the unit tangent at `node` in the direction of `along`, scaled, shape (n,)."""
     s = curve.scale[node.chosen]
     rows = np.vstack([node.J * s, (along[node.chosen])])
@@ -96,7 +96,7 @@ def tangent(curve: Equations, node: Node, along: Array) -> Array:
     return tau / np.linalg.norm(tau[node.chosen])
 
 
-def corrected(curve: Equations, z: Array, tau: Array) -> tuple[Node, int]:
+def corrected(curve: CurveEquations, z: Array, tau: Array) -> tuple[Node, int]:
     """Return the solution next to `z` in the plane orthogonal to `tau`, and the corrections.
 
     Raises:
@@ -121,7 +121,7 @@ def corrected(curve: Equations, z: Array, tau: Array) -> tuple[Node, int]:
     raise ValueError("the correction does not converge")
 
 
-class Step(NamedTuple):
+class ContinuationStep(NamedTuple):
     """Step of a continuation.
 
     Attributes:
@@ -140,9 +140,9 @@ class Step(NamedTuple):
 
 
 def followed(
-    curve: Equations, node: Node, tau: Array, longest: float,
-    accept: Callable[[Node, Node], None], most: Callable[[Step], float],
-) -> Iterator[Step]:  # fmt: skip
+    curve: CurveEquations, node: Node, tau: Array, longest: float,
+    accept: Callable[[Node, Node], None], most: Callable[[ContinuationStep], float],
+) -> Iterator[ContinuationStep]:  # fmt: skip
     """Yield steps along the curve until no step is possible.
 
     Args:
@@ -176,7 +176,7 @@ def followed(
             after = -after
         elif other:
             turn = -turn  # a branch point
-        step = Step(new, after, node, tau, length, sharp)
+        step = ContinuationStep(new, after, node, tau, length, sharp)
         yield step
         past = _behind(past, step, curve.scale)
         same, (curve, node) = curve, curve.anchored(new)
@@ -199,7 +199,7 @@ def _predicted(past: Past, length: float, scale: Array) -> Array:
     return ahead - past[-1][1].z / scale
 
 
-def _behind(past: Past, step: Step, scale: Array) -> Past:
+def _behind(past: Past, step: ContinuationStep, scale: Array) -> Past:
     """Return the points that predict the step after `step`."""
     new = (0.0, step.node, step.tau)
     if step.sharp or not np.array_equal(step.node.chosen, step.start.chosen):
@@ -211,7 +211,7 @@ def _behind(past: Past, step: Step, scale: Array) -> Past:
     return [*((s - shift, node, tau) for s, node, tau in past[1 - BEHIND :]), new]
 
 
-def _turn_before(curve: Equations, node: Node, tau: Array, length: float) -> float:
+def _turn_before(curve: CurveEquations, node: Node, tau: Array, length: float) -> float:
     """Return the orientation on the same part of the curve as `node`, a step before it.
 
     If it equals that of `node`, the last step did not cross a branch point: it led across a turn to
@@ -221,7 +221,7 @@ def _turn_before(curve: Equations, node: Node, tau: Array, length: float) -> flo
     return _turn(curve, back, tangent(curve, back, tau))
 
 
-def _turn(curve: Equations, node: Node, tau: Array) -> float:
+def _turn(curve: CurveEquations, node: Node, tau: Array) -> float:
     """Return the orientation of the curve, 1 or -1, which is constant except at branch points.
 
     It is the sign of the determinant of the equations with the tangent; 0 if they are not square.
@@ -231,7 +231,7 @@ def _turn(curve: Equations, node: Node, tau: Array) -> float:
 
 
 def located(
-    curve: Equations, step: Step, test: Callable[[Node, Array], float]
+    curve: CurveEquations, step: ContinuationStep, test: Callable[[Node, Array], float]
 ) -> tuple[Node, Array]:
     """Return the node of a step, and its tangent, at which `test` of these changes its sign.
 
@@ -262,7 +262,9 @@ def located(
     return found[float(root)]
 
 
-def at_edge(curve: Equations, step: Step, span: tuple[float, float]) -> Node | None:
+def at_edge(
+    curve: CurveEquations, step: ContinuationStep, span: tuple[float, float]
+) -> Node | None:
     """Return the node at which the last unknown leaves `span`; None if it stays within."""
     low, high = span
     value = float(step.node.z[-1])

@@ -16,7 +16,7 @@ from symfric.dynamics.shooting import METHOD
 from symfric.foundation import checks
 from symfric.foundation.numeric import Array
 from symfric.foundation.parameters import Variable
-from symfric.foundation.shown import Showing, Shown, Table
+from symfric.foundation.shown import Showing, Shown, TextTable
 from symfric.foundation.status import SolveError
 from symfric.integrator.simulate import simulate
 from symfric.laws.base import smooth
@@ -83,7 +83,7 @@ class DescribingFunction(Showing):
         header = ("amplitude [m/s]", "frequency [rad/s]", "magnitude [N s/m]", "phase [deg]")
         title = f"describing function of {type(self.law).__name__} at {self.N:g} N"
         lines = (f"{len(rows)} values, the first {ROWS}:",) if len(rows) > ROWS else ()
-        return Shown(title, lines, Table(header, tuple(rows[:ROWS]), numbers=(0, 1, 2, 3)))
+        return Shown(title, lines, TextTable(header, tuple(rows[:ROWS]), numbers=(0, 1, 2, 3)))
 
 
 def describing_function(

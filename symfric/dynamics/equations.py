@@ -38,7 +38,7 @@ DEPENDENT = 1e-9
 
 @final
 @dataclass(frozen=True, eq=False)
-class Equations:
+class ModelEquations:
     """Equations of a model at constant inputs.
 
     Attributes:
@@ -171,7 +171,7 @@ def _level(c: Contact, side: int) -> ca.SX:
         return ca.SX(float("nan"))
 
 
-def equations(where: str, model: Model, *, timed: bool = False) -> Equations:
+def equations(where: str, model: Model, *, timed: bool = False) -> ModelEquations:
     """Return the equations of a model, which caches them.
 
     Raises:
@@ -186,7 +186,7 @@ def equations(where: str, model: Model, *, timed: bool = False) -> Equations:
     return made
 
 
-def _made(model: Model) -> Equations:
+def _made(model: Model) -> ModelEquations:
     mechanics = model.holonomic
     if mechanics is not None:
         y, f, mass, names = holonomic_columns(model, replace(mechanics, index=1))
@@ -196,10 +196,10 @@ def _made(model: Model) -> Equations:
         y, f = ca.vertcat(model.vector("x"), model.vector("z")), ca.vertcat(model.ode, model.alg)
         mass = ca.diagcat(ca.SX.eye(len(model.x)), ca.SX(len(model.z), len(model.z)))
         names = [v.name for v in (*model.x, *model.z)]
-    return Equations(model, y, f, ca.DM(mass).full(), tuple(names))
+    return ModelEquations(model, y, f, ca.DM(mass).full(), tuple(names))
 
 
-class Tangent(NamedTuple):
+class TangentEquations(NamedTuple):
     """Linear equations e' = A e + B dd with dy = T e + Y dd.
 
     Attributes:
@@ -238,7 +238,7 @@ def independent(C: Array, scale: Array, states: Indices) -> tuple[Indices, Array
     return chosen, T
 
 
-def conditions(eq: Equations, y: Array, d: Array) -> tuple[Array, Array, Array]:
+def conditions(eq: ModelEquations, y: Array, d: Array) -> tuple[Array, Array, Array]:
     """Return C, and derivatives of f by y and by d, at y."""
     J, of_C, of_slips, K, *_ = (slope.full() for slope in eq.slopes(y, d))
     stuck = eq.stuck(y)
@@ -246,7 +246,7 @@ def conditions(eq: Equations, y: Array, d: Array) -> tuple[Array, Array, Array]:
     return np.vstack([J[eq.algebraic], of_C, of_slips[stuck], modes]), J, K
 
 
-def tangent(eq: Equations, y: Array, d: Array) -> Tangent:
+def tangent(eq: ModelEquations, y: Array, d: Array) -> TangentEquations:
     """Return the linear equations at the equilibrium `y`."""
     C, J, K = conditions(eq, y, d)
     states = np.setdiff1d(np.arange(len(eq.model.x)), eq.modes)
@@ -257,4 +257,4 @@ def tangent(eq: Equations, y: Array, d: Array) -> Tangent:
     right = np.hstack([J[moving] @ T, K[moving] + J[moving] @ Y])
     size = (np.abs(eq.M[moving]) @ eq.scale)[:, None]
     both: Array = np.linalg.lstsq(E / size, right / size, rcond=None)[0].astype(float)
-    return Tangent(chosen, both[:, : chosen.size], both[:, chosen.size :], T, Y)
+    return TangentEquations(chosen, both[:, : chosen.size], both[:, chosen.size :], T, Y)

@@ -9,11 +9,11 @@ from typing import Any, Literal, final
 import numpy as np
 from scipy.optimize import brentq
 
-from symfric.dynamics.balance import FORCE, SLIP, STILL, UP, Condition, settled, with_modes
-from symfric.dynamics.equations import Equations, Tangent, equations, tangent
+from symfric.dynamics.balance import FORCE, SLIP, STILL, UP, LinearCondition, settled, with_modes
+from symfric.dynamics.equations import ModelEquations, TangentEquations, equations, tangent
 from symfric.foundation.numeric import Array
 from symfric.foundation.parameters import check_names
-from symfric.foundation.shown import Showing, Shown, Table
+from symfric.foundation.shown import Showing, Shown, TextTable
 from symfric.model import Model, check_model
 from symfric.results.trajectory import Trajectory
 
@@ -83,7 +83,7 @@ class Equilibrium(Showing):
         return float(self.equations.expressed(expression)(self.y, self.data))
 
     @property
-    def equations(self) -> Equations:
+    def equations(self) -> ModelEquations:
         """Equations of the model at constant inputs."""
         return equations("equilibrium", self.model)
 
@@ -93,7 +93,7 @@ class Equilibrium(Showing):
         return np.array([*self.u.values(), *self.p.values()], dtype=float)
 
     @cached_property
-    def tangent(self) -> Tangent:
+    def tangent(self) -> TangentEquations:
         """Linear equations in the tangent space of the constraints."""
         return tangent(self.equations, self.y, self.data)
 
@@ -134,7 +134,7 @@ class Equilibrium(Showing):
             level = "" if isnan(c.level) else f", level {c.level:.6g} at this normal force"
             rows.append((c.name, f"{c.force:.6g}", "N", f"{c.state}s{level}"))
         lines = (f"one of a set of equilibria of dimension {self.free}",) * bool(self.free)
-        table = Table(("", "value", "unit", ""), tuple(rows), numbers=(1,))
+        table = TextTable(("", "value", "unit", ""), tuple(rows), numbers=(1,))
         return Shown(f"equilibrium of '{self.model.name}'", lines, table)
 
 
@@ -181,7 +181,7 @@ def equilibrium(
 
 
 def _start(
-    eq: Equations, guess: "Mapping[str, float] | Trajectory | Equilibrium | None",
+    eq: ModelEquations, guess: "Mapping[str, float] | Trajectory | Equilibrium | None",
     p: Mapping[str, float] | None,
 ) -> Array:  # fmt: skip
     """Return the first guess of all unknowns."""
@@ -198,7 +198,7 @@ def _start(
     return np.concatenate([x, [known.get(name, 0.0) for name in eq.names[x.size :]]])
 
 
-def _result(eq: Equations, y: Array, free: int, d: Array) -> Equilibrium:
+def _result(eq: ModelEquations, y: Array, free: int, d: Array) -> Equilibrium:
     """Return the equilibrium with the unknowns `y`."""
     model, nu = eq.model, len(eq.model.u)
     y[eq.modes] = np.round(y[eq.modes])
@@ -217,7 +217,7 @@ def _result(eq: Equations, y: Array, free: int, d: Array) -> Equilibrium:
     )
 
 
-def _contacts(eq: Equations, y: Array, d: Array) -> tuple[Holding, ...]:
+def _contacts(eq: ModelEquations, y: Array, d: Array) -> tuple[Holding, ...]:
     """Return the state of each contact."""
     found, scale = list[Holding](), eq.scale[: len(eq.model.x)].max(initial=0.0)
     for c, row in zip(eq.model.contacts, eq.contacts(y, d).full(), strict=True):
@@ -242,7 +242,7 @@ def _end(at: Equilibrium, name: str, side: float) -> float:
     linear = at.tangent
     u, s, _ = np.linalg.svd(linear.A)
     still = u[:, s <= CONSERVED * max(1.0, s.max(initial=0.0))].T
-    condition = Condition(np.zeros((still.shape[0], y_0.size)), y_0)
+    condition = LinearCondition(np.zeros((still.shape[0], y_0.size)), y_0)
     condition.W[:, linear.states] = still
     last = y_0
 

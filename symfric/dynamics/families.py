@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from symfric.dynamics.balance import rows_at_rest
 from symfric.dynamics.branch import Special
-from symfric.dynamics.curve import Equations as Curve
-from symfric.dynamics.curve import Node, Step, located
-from symfric.dynamics.equations import Equations, tangent
-from symfric.dynamics.shooting import Linear, Shooting
+from symfric.dynamics.curve import ContinuationStep, Node, located
+from symfric.dynamics.curve import CurveEquations as Curve
+from symfric.dynamics.equations import ModelEquations, tangent
+from symfric.dynamics.shooting import LinearisedShooting, OrbitShooting
 from symfric.foundation.numeric import Array
 from symfric.results.signals import extremes
 
@@ -44,7 +44,7 @@ class Point(NamedTuple):
 
 def sequence(node: Node) -> str:
     """Return the events of one period, from the first stick on; empty for an equilibrium."""
-    if isinstance(node.content, Linear):
+    if isinstance(node.content, LinearisedShooting):
         return " ".join(name for _, name in node.content.segments[0].run.happened)
     return ""
 
@@ -112,7 +112,7 @@ class Orbits(Family):
             state that is orthogonal to the rate. By default, the phase is that of the prediction.
     """
 
-    problem: Shooting
+    problem: OrbitShooting
     p: Mapping[str, float]
     scale: Array
     tolerance: float
@@ -131,7 +131,7 @@ class Orbits(Family):
         p = {**self.p, self.name: float(z[-1])}
         return self._node(z, self.problem.linear(z[None, :nx], float(z[nx]), p))
 
-    def _node(self, z: Array, found: Linear) -> Node:
+    def _node(self, z: Array, found: LinearisedShooting) -> Node:
         """Return the node of linearised shooting equations at z."""
         nx, (chosen, basis), part = z.size - 2, found.bases[0], found.segments[0]
         z, s = np.concatenate([part.start, z[nx:]]), self.scale[chosen]
@@ -222,7 +222,7 @@ class Equilibria(Family):
         scale, tolerance: see `Curve`.
     """
 
-    eq: Equations
+    eq: ModelEquations
     d: Array
     free: tuple[int, ...]
     scale: Array
@@ -303,7 +303,7 @@ class Trace:
         """Note that a special point was located to the end of its step only."""
         self.notes.append(f"the {kind} near {value:.6g} is located to its step only")
 
-    def locate(self, curve: Family, step: Step) -> None:
+    def locate(self, curve: Family, step: ContinuationStep) -> None:
         """Add the special points within a step."""
         if step.sharp:
             far = max((step.start, step.node), key=lambda n: float(n.z[-1]) * step.along[-1])

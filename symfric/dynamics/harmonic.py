@@ -32,7 +32,7 @@ RTOL, STEP = 1e-9, 1e-5
 
 @final
 @dataclass(frozen=True, eq=False)
-class Loop:
+class LinearLoop:
     """Linear loop with the sliding velocity v = C x of its contact.
 
     Attributes:
@@ -157,7 +157,7 @@ def _range(where: str, value: object) -> tuple[float, float]:
     return float(ends[0]), float(ends[1])
 
 
-def _loop(where: str, model: Model, u: Mapping[str, float], p: Mapping[str, float]) -> Loop:
+def _loop(where: str, model: Model, u: Mapping[str, float], p: Mapping[str, float]) -> LinearLoop:
     """Return the loop, linear near its equilibrium without friction force."""
     if len(model.contacts) != 1 or any(name != APPLIED for name in model.contacts[0].given):
         raise checks.refused(
@@ -179,17 +179,17 @@ def _loop(where: str, model: Model, u: Mapping[str, float], p: Mapping[str, floa
             f"{where}: model", "a loop that rests without friction force", model,
             "a constant speed or load is a bias, which this balance leaves out",
         )  # fmt: skip
-    return Loop(linear, np.array(C), Harmonic(law, N, RTOL))
+    return LinearLoop(linear, np.array(C), Harmonic(law, N, RTOL))
 
 
-def _residual(at: Array, loop: Loop) -> Array:
+def _residual(at: Array, loop: LinearLoop) -> Array:
     """Return real and imaginary part of 1 / (G(i w) n(V, w)) - 1 at (log V, log w)."""
     V, w = np.exp(at).tolist()
     off = 1 / (complex(loop.states(np.array([w]))[0] @ loop.C) * loop.law(V, w)) - 1
     return np.array([off.real, off.imag])
 
 
-def _guesses(loop: Loop, V: tuple[float, float], w: tuple[float, float]) -> Array:
+def _guesses(loop: LinearLoop, V: tuple[float, float], w: tuple[float, float]) -> Array:
     """Return (log V, log w) of the cells in which both parts of the balance change their signs.
 
     The describing function is interpolated; the response of the loop is not.
@@ -215,7 +215,7 @@ def _guesses(loop: Loop, V: tuple[float, float], w: tuple[float, float]) -> Arra
 
 
 def _predicted(
-    model: Model, loop: Loop, at: Array, u: Mapping[str, float], p: Mapping[str, float]
+    model: Model, loop: LinearLoop, at: Array, u: Mapping[str, float], p: Mapping[str, float]
 ) -> HarmonicBalance:
     """Return the prediction at (V, w)."""
     V, w = float(at[0]), float(at[1])

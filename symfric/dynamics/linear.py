@@ -16,7 +16,7 @@ from symfric.dynamics.equilibrium import Equilibrium
 from symfric.foundation import checks
 from symfric.foundation.numeric import Array
 from symfric.foundation.parameters import check_names
-from symfric.foundation.shown import Showing, Shown, Table, among
+from symfric.foundation.shown import Showing, Shown, TextTable, among
 from symfric.model import Model, check_model
 from symfric.results.stored import module
 
@@ -175,7 +175,7 @@ class LinearModel(Showing):
         ]  # fmt: skip
         header = ("eigenvalue [1/s]", "frequency [rad/s]", "damping")
         title = f"linear model of '{self.at.model.name}', {words[self.stable]}"
-        return Shown(title, tuple(lines), Table(header, tuple(rows), numbers=(0, 1, 2)))
+        return Shown(title, tuple(lines), TextTable(header, tuple(rows), numbers=(0, 1, 2)))
 
 
 def positive(where: str, value: object, what: str) -> Array:

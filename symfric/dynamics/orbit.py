@@ -11,10 +11,17 @@ from numpy.typing import NDArray
 
 from symfric.dynamics.equilibrium import Equilibrium
 from symfric.dynamics.linear import linearize
-from symfric.dynamics.shooting import CLOSED, METHOD, Linear, Shooting, check_period, solved
+from symfric.dynamics.shooting import (
+    CLOSED,
+    METHOD,
+    LinearisedShooting,
+    OrbitShooting,
+    check_period,
+    solved,
+)
 from symfric.foundation import checks
 from symfric.foundation.numeric import Array
-from symfric.foundation.shown import Showing, Shown, Table
+from symfric.foundation.shown import Showing, Shown, TextTable
 from symfric.integrator import Input, Trajectory, simulate
 from symfric.model import Model, check_model
 from symfric.model.kinds import MODE
@@ -124,7 +131,7 @@ class PeriodicOrbit(Showing):
             low, high = self.cycle.extremes(v.name)
             rows.append((v.name, v.unit, f"{low:.6g}", f"{high:.6g}"))
         title = f"periodic orbit of '{self.model.name}'{kind}, {words[self.stable]}"
-        table = Table(("state", "unit", "least", "greatest"), tuple(rows), numbers=(2, 3))
+        table = TextTable(("state", "unit", "least", "greatest"), tuple(rows), numbers=(2, 3))
         return Shown(title, tuple(lines), table)
 
 
@@ -218,7 +225,7 @@ def found(
     nominal = model.nominal("x")
     scale = np.maximum(ranges, 1e-9 * nominal)
     scale[[v.kind == MODE for v in model.x]] = 1.0
-    problem = Shooting(model, u, (), scale, _signs(model, symmetric), rtol, driven)
+    problem = OrbitShooting(model, u, (), scale, _signs(model, symmetric), rtol, driven)
     part = T / 2 if symmetric else T
     if not driven:
         start = _fastest(model, run, T)
@@ -321,7 +328,7 @@ def _fastest(model: Model, run: Trajectory, period: float) -> float:
 
 
 def _returning(
-    problem: Shooting, run: Trajectory, start: float, part: float, p: Mapping[str, float]
+    problem: OrbitShooting, run: Trajectory, start: float, part: float, p: Mapping[str, float]
 ) -> tuple[Trajectory, float]:
     """Return a run from the state at `start`, and the time at which it returns most closely."""
     names = [v.name for v in problem.model.x]
@@ -335,7 +342,7 @@ def _returning(
     return run, float(times[int(np.argmin(np.abs(off).max(axis=0)))])
 
 
-def _check(problem: Shooting, at: Linear, ranges: Array) -> None:
+def _check(problem: OrbitShooting, at: LinearisedShooting, ranges: Array) -> None:
     """Raise an error for a solution that is not the orbit."""
     model, modes = problem.model, problem.eq.modes
     where = f"periodic_orbit: expected an orbit of '{model.name}' near the guess"
@@ -352,7 +359,9 @@ def _check(problem: Shooting, at: Linear, ranges: Array) -> None:
         raise ValueError(f"{where}, got an equilibrium; give a run with a larger motion")
 
 
-def _orbit(problem: Shooting, p: Mapping[str, float], at: Linear, symmetric: bool) -> PeriodicOrbit:
+def _orbit(
+    problem: OrbitShooting, p: Mapping[str, float], at: LinearisedShooting, symmetric: bool
+) -> PeriodicOrbit:
     """Return the orbit with its multipliers and its error."""
     model, start = problem.model, at.segments[0].start
     x = dict(zip((v.name for v in model.x), start.tolist(), strict=True))

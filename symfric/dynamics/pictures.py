@@ -69,7 +69,7 @@ def portrait(run: Trajectory, x: str, y: str, path: str | Path | None) -> Figure
     return save(figure, path)
 
 
-class Curve(NamedTuple):
+class Plotted(NamedTuple):
     """Branch in a bifurcation diagram.
 
     Attributes:
@@ -89,7 +89,7 @@ class Curve(NamedTuple):
 
 
 def bifurcation(
-    curves: Sequence[Curve], runs: Sequence[tuple[Array, Array, Array]], labels: tuple[str, str],
+    curves: Sequence[Plotted], runs: Sequence[tuple[Array, Array, Array]], labels: tuple[str, str],
     path: str | Path | None,
 ) -> Figure:  # fmt: skip
     """Plot branches over a parameter: stable parts solid, unstable ones dashed.
@@ -130,7 +130,7 @@ def bifurcation(
     return save(figure, path)
 
 
-def _legend(figure: Figure, curves: Sequence[Curve], with_runs: bool) -> None:
+def _legend(figure: Figure, curves: Sequence[Plotted], with_runs: bool) -> None:
     """Add a legend below a bifurcation diagram."""
     handles = [Line2D([], [], color=colour(k), label=c.name) for k, c in enumerate(curves)]
     if not all(curve.stable.all() for curve in curves):

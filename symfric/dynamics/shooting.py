@@ -19,7 +19,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.dynamics.equations import Equations, Indices, equations, independent
+from symfric.dynamics.equations import Indices, ModelEquations, equations, independent
 from symfric.foundation import checks
 from symfric.foundation.numeric import Array
 from symfric.foundation.status import SolveError
@@ -48,7 +48,7 @@ class Segment(NamedTuple):
     of_p: Array
 
 
-class Linear(NamedTuple):
+class LinearisedShooting(NamedTuple):
     """Shooting equations at one point, linearised.
 
     Attributes:
@@ -85,7 +85,7 @@ class Linear(NamedTuple):
 
 @final
 @dataclass(frozen=True, eq=False)
-class Shooting:
+class OrbitShooting:
     """Shooting equations of a model.
 
     Attributes:
@@ -107,7 +107,7 @@ class Shooting:
     driven: bool
 
     @cached_property
-    def eq(self) -> Equations:
+    def eq(self) -> ModelEquations:
         """Equations of the model with constraints and slips."""
         return equations("periodic_orbit", self.model, timed=True)
 
@@ -165,7 +165,7 @@ class Shooting:
             run, ends[0], ends[1], np.array(rates), by, of_p.reshape(x.size, len(self.names))
         )
 
-    def linear(self, X: Array, T: float, p: Mapping[str, float]) -> Linear:
+    def linear(self, X: Array, T: float, p: Mapping[str, float]) -> LinearisedShooting:
         """Return the shooting equations at the states X (m, nx) and the time T of all segments."""
         m, values = len(X), self.model.values("p", p)
         parts = tuple(self.flow(x, i * T / m, T / m, p) for i, x in enumerate(X))
@@ -190,7 +190,7 @@ class Shooting:
         if more:
             chosen, T_0 = bases[0]
             phase[: chosen.size] = (parts[0].rates[0] / self.scale**2) @ T_0
-        return Linear(r, J, phase, monodromy[bases[0][0]], bases, parts, T, values)
+        return LinearisedShooting(r, J, phase, monodromy[bases[0][0]], bases, parts, T, values)
 
 
 ITERATIONS, HALVINGS = 30, 6
@@ -203,7 +203,9 @@ DEPENDENT = 1e-12
 """Relative singular value below which corrections are not determined."""
 
 
-def solved(problem: Shooting, starts: Array, time: float, p: Mapping[str, float]) -> Linear:
+def solved(
+    problem: OrbitShooting, starts: Array, time: float, p: Mapping[str, float]
+) -> LinearisedShooting:
     """Return the shooting equations at the orbit near `starts` (m, nx) and the time of a period.
 
     Raises:
@@ -228,8 +230,8 @@ def solved(problem: Shooting, starts: Array, time: float, p: Mapping[str, float]
 
 
 def tried(
-    problem: Shooting, starts: Array, time: float, p: Mapping[str, float]
-) -> Linear | ValueError:
+    problem: OrbitShooting, starts: Array, time: float, p: Mapping[str, float]
+) -> LinearisedShooting | ValueError:
     """Return the linearised equations, or the error of a run."""
     try:
         return problem.linear(starts, time, p)
@@ -237,13 +239,13 @@ def tried(
         return error
 
 
-def residual(problem: Shooting, at: Linear) -> float:
+def residual(problem: OrbitShooting, at: LinearisedShooting) -> float:
     """Return the largest residual relative to the magnitudes of the states."""
     scales = np.concatenate([problem.scale[chosen] for chosen, _ in at.bases])
     return float(np.abs(at.r / scales).max(initial=0.0))
 
 
-def moved(problem: Shooting, at: Linear, step: Array) -> tuple[Array, float]:
+def moved(problem: OrbitShooting, at: LinearisedShooting, step: Array) -> tuple[Array, float]:
     """Return the states and the time after a step of the coordinates."""
     starts, k = list[Array](), 0
     for (chosen, directions), segment in zip(at.bases, at.segments, strict=True):
@@ -252,12 +254,14 @@ def moved(problem: Shooting, at: Linear, step: Array) -> tuple[Array, float]:
     return np.array(starts), at.time + (0.0 if problem.driven else float(step[k]))
 
 
-def _improved(problem: Shooting, at: Linear, p: Mapping[str, float]) -> Linear | ValueError:
+def _improved(
+    problem: OrbitShooting, at: LinearisedShooting, p: Mapping[str, float]
+) -> LinearisedShooting | ValueError:
     """Return the equations after a damped Newton step, or the reason why there is none."""
     step, now, share = _step(problem, at), residual(problem, at), 1.0
     if not problem.driven:
         share = min(1.0, LONGEST * at.time / max(abs(float(step[-1])), 1e-300))
-    found: Linear | ValueError = ValueError("the iteration does not converge")
+    found: LinearisedShooting | ValueError = ValueError("the iteration does not converge")
     for _ in range(HALVINGS):
         found = tried(problem, *moved(problem, at, share * step), p)
         if not isinstance(found, ValueError):
@@ -268,7 +272,7 @@ def _improved(problem: Shooting, at: Linear, p: Mapping[str, float]) -> Linear |
     return found
 
 
-def _step(problem: Shooting, at: Linear) -> Array:
+def _step(problem: OrbitShooting, at: LinearisedShooting) -> Array:
     """Return the Newton step of the coordinates and of the time."""
     rows = np.concatenate([problem.scale[chosen] for chosen, _ in at.bases])
     if problem.driven:

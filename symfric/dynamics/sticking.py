@@ -7,7 +7,7 @@ from typing import NamedTuple, final
 import casadi as ca
 import numpy as np
 
-from symfric.dynamics.curve import Node, Step, corrected
+from symfric.dynamics.curve import ContinuationStep, Node, corrected
 from symfric.dynamics.families import Family, Orbits, sequence
 from symfric.dynamics.orbit import periodic_orbit
 from symfric.foundation.numeric import Array
@@ -89,9 +89,9 @@ class Near:
 
     curve: Family
     gaps: tuple[Gap, ...] = ()
-    last: Step | None = None
+    last: ContinuationStep | None = None
 
-    def most(self, step: Step) -> float:
+    def most(self, step: ContinuationStep) -> float:
         """Return the largest length of the next step: short of the predicted grazing."""
         if not isinstance(self.curve, Orbits):
             return np.inf
@@ -141,7 +141,7 @@ def _zero(points: Sequence[tuple[float, float]], otherwise: float) -> float:
     return p_1 - g_1 * (p_1 - p_0) / (g_1 - g_0)
 
 
-def _stopping(step: Step) -> tuple[str, float]:
+def _stopping(step: ContinuationStep) -> tuple[str, float]:
     """Return the kind and the parameter of the end of an orbit that sticks.
 
     It ends in a grazing if the slip reaches zero ever more slowly. The square of its rate is then

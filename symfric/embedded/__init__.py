@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from symfric.foundation.lazy import load_lazily
 
 if TYPE_CHECKING:
-    from symfric.embedded.measure import Measured as Measured
+    from symfric.embedded.measure import BlockMeasurement as BlockMeasurement
     from symfric.embedded.measure import measure as measure
     from symfric.embedded.measure import wrong_on_target as wrong_on_target
     from symfric.embedded.step_errors import StepError as StepError

@@ -46,7 +46,7 @@ FAMILY = 1e-3
 
 @final
 @dataclass(frozen=True)
-class Measured:
+class BlockMeasurement:
     """Measurement of one block on one core.
 
     Attributes:
@@ -101,7 +101,7 @@ def measure(
     steps: int = STEPS,
     guards: bool = True,
     tools: Tools | Absent | None = None,
-) -> Measured:
+) -> BlockMeasurement:
     """Cross-compile a step of `block`, run it under QEMU and compare it with the host.
 
     QEMU counts instructions exactly, but not cycles. The inputs are those of `day`, then those of
@@ -132,7 +132,7 @@ def measure(
     checks.flag(f"{where}: guards", guards)
     found = find_tools() if tools is None else tools
     if isinstance(found, Absent):
-        return Measured(block.name, real, core, by, f"skipped: {found.advice}")
+        return BlockMeasurement(block.name, real, core, by, f"skipped: {found.advice}")
     further = regimes(block)
     inputs, columns = np.vstack([day(block, steps), *further.values()]), len(block.states)
     columns += len(block.outputs)
@@ -149,7 +149,7 @@ def measure(
         equal = _equal(c, source, inputs, results)
     means = instructions[steps:].reshape(-1, STRETCH).mean(axis=1).tolist()
     expected = run_vm(CBlock(block, c.real), inputs, results[:, : len(block.states)])
-    return Measured(
+    return BlockMeasurement(
         block.name,
         real,
         core,

@@ -8,7 +8,7 @@ from typing import final
 import numpy as np
 
 from symfric.codegen.blocks.block import Block, CBlock
-from symfric.codegen.blocks.from_model import Machine, plant_block
+from symfric.codegen.blocks.from_model import ModelSource, plant_block
 from symfric.codegen.guards import STEP_SIZE
 from symfric.codegen.runner import run_vm
 from symfric.emitter.c99 import DOUBLE
@@ -48,7 +48,7 @@ class StepError:
 
 
 def step_errors(
-    machine: Model | Machine,
+    machine: Model | ModelSource,
     h: float,
     t_end: float,
     *,

@@ -26,8 +26,8 @@ import casadi as ca
 from symfric.emitter.c99 import Real
 from symfric.emitter.emit import INDENT, Code, emit
 from symfric.emitter.logic import settled, simplified
-from symfric.emitter.rolling import OUTER, READ, TABLE, TRUTH, Arrays, Store, is_truth
-from symfric.emitter.segments import Loop, Plan, planned
+from symfric.emitter.rolling import OUTER, READ, TABLE, TRUTH, Arrays, StoredRows, is_truth
+from symfric.emitter.segments import ElementLoop, LoopPlan, planned
 from symfric.foundation.graph import LEAVES, Graph, Node, pruned
 
 Places = Mapping[tuple[int, int], str]
@@ -70,7 +70,7 @@ def _better(source: Graph) -> Graph:
     return settled(simplified(source))
 
 
-class _Part(NamedTuple):
+class _StraightPart(NamedTuple):
     """Straight part of a plan.
 
     Attributes:
@@ -89,7 +89,7 @@ class _Part(NamedTuple):
     results: list[list[int]]
 
 
-def _part(plan: Plan, number: int) -> _Part:
+def _part(plan: LoopPlan, number: int) -> _StraightPart:
     nodes = plan.source.nodes
     kept = [i for i, part in plan.part.items() if part == number]
     rows = [
@@ -101,14 +101,14 @@ def _part(plan: Plan, number: int) -> _Part:
     needed = sorted(needed.union(start for _, start in plan.started(number)) - set(kept))
     into = [i for i in needed if nodes[i].op not in LEAVES]
     inputs = [nodes[i].entry for i in needed if nodes[i].op == ca.OP_INPUT]
-    return _Part(number, kept, into, inputs, rows, results)
+    return _StraightPart(number, kept, into, inputs, rows, results)
 
 
 @dataclass
 class _Rolled:
     """Writer of a plan with loops, for the arguments of `emit_rolled`."""
 
-    plan: Plan
+    plan: LoopPlan
     names: Sequence[Sequence[str]]
     targets: Sequence[Sequence[str]]
     real: Real
@@ -184,7 +184,7 @@ class _Rolled:
         """Return the numbers and the conditions among `nodes`."""
         return [[i for i in nodes if is_truth(self.source, i) == truth] for truth in (False, True)]
 
-    def _straight(self, part: _Part) -> Iterator[str]:
+    def _straight(self, part: _StraightPart) -> Iterator[str]:
         """Return the lines of a straight part."""
         into, starts = self._split(part.into), self.plan.started(part.number)
         made = self._split([i for i in part.kept if i in self.carried])
@@ -212,7 +212,7 @@ class _Rolled:
         waiting = {name: kind for kind, group in zip(kinds, new, strict=True) for name in group}
         return _declared(self._counted(code), waiting)
 
-    def _loop(self, loop: Loop) -> list[str]:
+    def _loop(self, loop: ElementLoop) -> list[str]:
         """Return the lines of a loop."""
         body, i = loop.body, self.index
         reads: dict[str, str] = {}
@@ -260,7 +260,7 @@ class _Rolled:
             return self.names[node.entry[0]][node.entry[1]]
         return self.local[i]
 
-    def _stored(self, store: Store) -> str:
+    def _stored(self, store: StoredRows) -> str:
         return f"{store.array.text}[{self._at(store.offset)}] = {{}};"
 
     def _at(self, offset: int) -> str:

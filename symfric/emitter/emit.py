@@ -16,7 +16,15 @@ import casadi as ca
 
 from symfric.emitter.c99 import FORMS, FUNCTIONS, Real, Writer, operation_name
 from symfric.emitter.logic import LOWERED, logical, settled, simplified
-from symfric.emitter.statements import Branch, Local, Side, Statement, Store, Stores, planned
+from symfric.emitter.statements import (
+    Branch,
+    LocalConstant,
+    Side,
+    Statement,
+    Stores,
+    StoreStatement,
+    planned,
+)
 from symfric.foundation.graph import LEAVES, Graph
 
 INDENT = "    "
@@ -128,7 +136,9 @@ class _Body:
         nodes, loads = enumerate(self.source.nodes), self.loads
         inputs = {node.entry: i for i, node in nodes if node.op == ca.OP_INPUT}
         patterns = {
-            Store(k, j): text for k, row in enumerate(self.targets) for j, text in enumerate(row)
+            StoreStatement(k, j): text
+            for k, row in enumerate(self.targets)
+            for j, text in enumerate(row)
         }
         shared = [self.names[i][j] for i, j in inputs if (i, j) not in loads]
         late = any(text.startswith("return") for text in patterns.values())
@@ -163,7 +173,7 @@ class _Body:
         written = {
             self.targets[store.result][store.row].partition(" ")[0]
             for store in stores
-            if isinstance(store, Store)
+            if isinstance(store, StoreStatement)
         }
         return sorted(
             i
@@ -175,7 +185,7 @@ class _Body:
         """Return the lines of a statement."""
         nodes, write = self.source.nodes, self.writer
         match statement:
-            case Local(node):
+            case LocalConstant(node):
                 text = write.expression(node).text
                 words = self.real.declared(write.logical[node], constant=True)
                 return [f"{words} {self._name(node)} = {text};"]
@@ -183,19 +193,25 @@ class _Body:
                 return self._branch(statement)
             case Side(select, side):
                 value, goal = nodes[select].args[side], self._goal(select)
-                if isinstance(goal, Store):
+                if isinstance(goal, StoreStatement):
                     return [self._stored(goal, value)]
                 shown = (write.expression if write.logical[goal] else write.number)(value)
                 return [f"{write.names[goal]} = {shown.text};"]
-            case Store(result, row):
+            case StoreStatement(result, row):
                 return [self._stored(statement, self.source.results[result][row])]
 
-    def _goal(self, select: int) -> int | Store:
+    def _goal(self, select: int) -> int | StoreStatement:
         """Return the result that a select is written to, or the select whose variable it shares."""
         goal = self.plan.goals.get(select)
-        return select if goal is None else goal if isinstance(goal, Store) else self._goal(goal)
+        return (
+            select
+            if goal is None
+            else goal
+            if isinstance(goal, StoreStatement)
+            else self._goal(goal)
+        )
 
-    def _stored(self, store: Store, value: int) -> str:
+    def _stored(self, store: StoreStatement, value: int) -> str:
         shown = (self.writer.truth if store.result in self.truths else self.writer.number)(value)
         return self.targets[store.result][store.row].format(shown.text)
 

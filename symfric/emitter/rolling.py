@@ -56,7 +56,7 @@ class Arrays(NamedTuple):
     written: tuple[Array, ...] = ()
 
 
-class Store(NamedTuple):
+class StoredRows(NamedTuple):
     """Consecutive rows of a result, beginning at `offset` in `array`."""
 
     lanes: Lanes
@@ -72,7 +72,7 @@ class Sum(NamedTuple):
     total: int
 
 
-Strand = Store | Sum
+Strand = StoredRows | Sum
 
 
 class Body(NamedTuple):
@@ -106,7 +106,7 @@ def strands(source: Graph, arrays: Arrays) -> list[Strand]:
     for array in arrays.written:
         nodes = source.results[array.group][array.first : array.first + array.size]
         runs = _runs(source, nodes, arrays, same=True)
-        found += (Store(nodes[a:b], array, a) for a, b in runs)
+        found += (StoredRows(nodes[a:b], array, a) for a, b in runs)
     for terms, after in _chains(source):
         for a, b in _runs(source, terms, arrays):
             found.append(Sum(tuple(terms[a:b]), after[a - 1] if a else None, after[b - 1]))
@@ -211,7 +211,7 @@ def woven(source: Graph, strands: Sequence[Strand], arrays: Arrays) -> Body:
         elif node.op != ca.OP_CONST:
             node = replace(node, args=tuple(number[a] for a in gathered[lanes]))
         number[lanes] = known.setdefault(node, len(known))
-    stores = tuple(number[s.lanes] for s in strands if isinstance(s, Store))
+    stores = tuple(number[s.lanes] for s in strands if isinstance(s, StoredRows))
     sums = tuple(number[s.lanes] for s in strands if isinstance(s, Sum))
     inside = frozenset(i for lanes in gathered if len(set(lanes)) > 1 for i in lanes)
     leaves = tuple(outer), tuple(truths), tuple(reads), tuple(tables)

@@ -14,7 +14,7 @@ from operator import itemgetter
 from typing import NamedTuple, final
 
 from symfric.emitter.c99 import TRANSCENDENTAL
-from symfric.emitter.rolling import Arrays, Body, Store, Strand, Sum, strands, woven
+from symfric.emitter.rolling import Arrays, Body, StoredRows, Strand, Sum, strands, woven
 from symfric.foundation.graph import LEAVES, Graph, Node
 
 CALL = 20
@@ -27,7 +27,7 @@ MORE = 1.1
 """Largest ratio of executed operations with and without loops."""
 
 
-class Loop(NamedTuple):
+class ElementLoop(NamedTuple):
     """Loop over `size` elements in the stage `stage` >= 1."""
 
     stage: int
@@ -41,18 +41,18 @@ class Loop(NamedTuple):
         return [strand for strand in self.strands if isinstance(strand, Sum)]
 
     @property
-    def stores(self) -> list[Store]:
+    def stores(self) -> list[StoredRows]:
         """Rows that the loop writes."""
-        return [strand for strand in self.strands if isinstance(strand, Store)]
+        return [strand for strand in self.strands if isinstance(strand, StoredRows)]
 
 
 @final
 @dataclass(frozen=True)
-class Plan:
+class LoopPlan:
     """Graph with its loops in the order of their execution."""
 
     source: Graph
-    loops: tuple[Loop, ...] = ()
+    loops: tuple[ElementLoop, ...] = ()
 
     @cached_property
     def last(self) -> int:
@@ -110,7 +110,7 @@ class Plan:
         }
 
 
-def planned(source: Graph, arrays: Arrays) -> Plan:
+def planned(source: Graph, arrays: Arrays) -> LoopPlan:
     """Return the graph with all loops that save statements at little cost.
 
     Loops are omitted if they are short, if their sums are unused, or if they would overwrite rows
@@ -124,15 +124,15 @@ def planned(source: Graph, arrays: Arrays) -> Plan:
         for strand in chosen:
             groups[stages[strand], len(strand.lanes)].append(strand)
         loops = (
-            Loop(stage, size, tuple(group), woven(source, group, arrays))
+            ElementLoop(stage, size, tuple(group), woven(source, group, arrays))
             for (stage, size), group in sorted(groups.items(), key=itemgetter(0))
         )
-        plan = Plan(source, tuple(loops))
+        plan = LoopPlan(source, tuple(loops))
         out = _overwriting(plan.loops) or _idle(plan) or _wasteful(plan, chosen)
         if not out:
             return plan
         chosen = {s: body for s, body in chosen.items() if s not in out}
-    return Plan(source)
+    return LoopPlan(source)
 
 
 def _stages(source: Graph, bodies: Mapping[Strand, Body]) -> dict[Strand, int]:
@@ -150,7 +150,7 @@ def _stages(source: Graph, bodies: Mapping[Strand, Body]) -> dict[Strand, int]:
             known.append(stages[sums[i]])
         else:
             known.append(after(*node.args))
-    stores = [strand for strand in bodies if isinstance(strand, Store)]
+    stores = [strand for strand in bodies if isinstance(strand, StoredRows)]
     stages |= {store: 1 + after(*bodies[store].taken) for store in stores}
     for _ in range(max(stages.values(), default=0)):
         for store in stores:
@@ -159,12 +159,12 @@ def _stages(source: Graph, bodies: Mapping[Strand, Body]) -> dict[Strand, int]:
     return stages
 
 
-def _reads(body: Body, store: Store) -> list[int]:
+def _reads(body: Body, store: StoredRows) -> list[int]:
     """Return the offsets at which a body reads the memory that `store` writes."""
     return [offset for array, offset in body.reads if array.text == store.array.text]
 
 
-def _overwriting(loops: Sequence[Loop]) -> set[Strand]:
+def _overwriting(loops: Sequence[ElementLoop]) -> set[Strand]:
     """Return the stores that would overwrite rows before they have been read."""
     return {
         store
@@ -175,17 +175,17 @@ def _overwriting(loops: Sequence[Loop]) -> set[Strand]:
     }
 
 
-def _idle(plan: Plan) -> set[Strand]:
+def _idle(plan: LoopPlan) -> set[Strand]:
     """Return sums without users, and the strands of short loops."""
 
-    def spared(loop: Loop) -> int:
+    def spared(loop: ElementLoop) -> int:
         return (loop.size - 1) * (loop.body.graph.operations + len(loop.strands))
 
     short = {s for loop in plan.loops if spared(loop) < SPARED for s in loop.strands}
     return short | {s for total, s in plan.totals.items() if total not in plan.needed}
 
 
-def _wasteful(plan: Plan, chosen: Mapping[Strand, Body]) -> set[Strand]:
+def _wasteful(plan: LoopPlan, chosen: Mapping[Strand, Body]) -> set[Strand]:
     """Return the strands that repeat most operations, if too many are repeated."""
     nodes = plan.source.nodes
     executed = _cost([nodes[i] for i in plan.part])

@@ -71,7 +71,7 @@ LONGEST = 5
 
 @final
 @dataclass(frozen=True)
-class Local:
+class LocalConstant:
     """Constant local: the value of `node`."""
 
     node: int
@@ -98,14 +98,14 @@ class Side:
 
 @final
 @dataclass(frozen=True)
-class Store:
+class StoreStatement:
     """Statement that writes a row of a result."""
 
     result: int
     row: int
 
 
-Statement = Local | Branch | Side | Store
+Statement = LocalConstant | Branch | Side | StoreStatement
 
 
 @final
@@ -120,12 +120,12 @@ class Stores:
     """
 
     late: bool = False
-    within: frozenset[Store] = frozenset()
-    same: Mapping[Store, int] = field(default_factory=dict[Store, int])
+    within: frozenset[StoreStatement] = frozenset()
+    same: Mapping[StoreStatement, int] = field(default_factory=dict[StoreStatement, int])
 
 
 @final
-class Plan:
+class StatementPlan:
     """Statements of a function, region by region.
 
     Attributes:
@@ -157,7 +157,7 @@ class Plan:
 
     def _in_order(self, statements: Sequence[Statement]) -> list[Statement]:
         """Return the statements of a region in order, without those that wait for each other."""
-        last = [s for s in statements if self.stores.late and isinstance(s, Store)]
+        last = [s for s in statements if self.stores.late and isinstance(s, StoreStatement)]
         early = [s for s in statements if s not in last]
         order = ordered([self.takes[s] for s in early], [_made(s) for s in early])
         left = (early[k] for k in {*range(len(early))}.difference(order))
@@ -192,10 +192,10 @@ class Plan:
                 weight[i] = 0
         return frozenset(kept)
 
-    def _goals(self, bools: Sequence[bool], uses: Counter[int]) -> dict[int, int | Store]:
+    def _goals(self, bools: Sequence[bool], uses: Counter[int]) -> dict[int, int | StoreStatement]:
         """Return the goals of selects without a variable: each is used once, as result or side."""
         once = {i for i in self.placed.labels if uses[i] == 1}
-        goals: dict[int, int | Store] = {
+        goals: dict[int, int | StoreStatement] = {
             i: outer
             for outer in self.placed.labels
             for i in self.nodes[outer].args[1:]
@@ -212,7 +212,7 @@ class Plan:
         found, done = self.placed, set[Branch]()
         for i, node in enumerate(self.nodes):
             if i in self.locals:
-                self.items[found.place[i]].append(Local(i))
+                self.items[found.place[i]].append(LocalConstant(i))
             elif i in found.labels:
                 branch = self.branches[found.place[i], found.labels[i]]
                 if branch not in done:
@@ -222,9 +222,9 @@ class Plan:
                     if not self._is_there(i, node.args[side]):
                         inner = found.inside[branch.region, branch.label, side]
                         self.items[inner].append(Side(i, side))
-        direct = {goal for goal in self.goals.values() if isinstance(goal, Store)}
+        direct = {goal for goal in self.goals.values() if isinstance(goal, StoreStatement)}
         for k, row in enumerate(found.source.results):
-            stores = ((Store(k, j), i) for j, i in enumerate(row))
+            stores = ((StoreStatement(k, j), i) for j, i in enumerate(row))
             same = self.stores.same
             self.items[0] += (s for s, i in stores if s not in direct and same.get(s) != i)
 
@@ -232,7 +232,7 @@ class Plan:
         """Return True if a side of a select is already in its place and need not be written."""
         if self.goals.get(value) == select:
             return True
-        goal: int | Store | None = select
+        goal: int | StoreStatement | None = select
         while isinstance(goal, int):
             goal = self.goals.get(goal)
         return goal is not None and self.stores.same.get(goal) == value
@@ -252,13 +252,13 @@ class Plan:
 
     def _operands(self, statement: Statement) -> Sequence[int]:
         match statement:
-            case Local(node):
+            case LocalConstant(node):
                 return self.nodes[node].args
             case Branch(selects=selects):
                 return self.nodes[selects[0]].args[:1]
             case Side(select, side):
                 return (self.nodes[select].args[side],)
-            case Store(result, row):
+            case StoreStatement(result, row):
                 return (self.placed.source.results[result][row],)
 
     def _take(
@@ -280,7 +280,7 @@ class Plan:
         self.takes.setdefault(at, set()).add(i)
 
 
-def planned(source: Graph, bools: Sequence[bool], stores: Stores) -> Plan:
+def planned(source: Graph, bools: Sequence[bool], stores: Stores) -> StatementPlan:
     """Return the statements of a simplified graph.
 
     Args:
@@ -288,7 +288,7 @@ def planned(source: Graph, bools: Sequence[bool], stores: Stores) -> Plan:
         stores: rules for writing results.
     """
     apart: set[int] = set()
-    while (plan := Plan(placed(source, apart), bools, stores)).waiting:
+    while (plan := StatementPlan(placed(source, apart), bools, stores)).waiting:
         apart |= plan.waiting
     return plan
 
@@ -296,11 +296,11 @@ def planned(source: Graph, bools: Sequence[bool], stores: Stores) -> Plan:
 def _made(statement: Statement) -> tuple[int, ...]:
     """Return the nodes whose values a statement computes."""
     match statement:
-        case Local(node):
+        case LocalConstant(node):
             return (node,)
         case Branch(selects=selects):
             return selects
         case Side(select):
             return (select,)
-        case Store():
+        case StoreStatement():
             return ()

@@ -11,7 +11,7 @@ import numpy as np
 
 from symfric.foundation.numeric import Array
 from symfric.foundation.parameters import check_names
-from symfric.foundation.shown import Showing, Shown, Table
+from symfric.foundation.shown import Showing, Shown, TextTable
 from symfric.foundation.style import DASHES, colour, dash
 from symfric.foundation.units import readable
 from symfric.laws import ALL_LAWS, PHENOMENA, POPULATIONS, AnyLaw, Law, Population, law_name
@@ -87,7 +87,7 @@ class FigureData(Showing):
             for c in self.curves
         )
         header = ("curve", *(f"{name} [{unit}]" for name, unit in self.units.items()))
-        return Shown(f"figure '{self.name}': {self.title}", (), Table(header, rows))
+        return Shown(f"figure '{self.name}': {self.title}", (), TextTable(header, rows))
 
     def thumbnail(self) -> "Figure":
         """Return the figure of `plot`."""

@@ -40,7 +40,7 @@ EVENT_TOLERANCE = 1e-10
 """Tolerance of event times [s], as in `simulate`."""
 
 
-class Equations(NamedTuple):
+class UnitEquations(NamedTuple):
     """Equations of a model and their numerical settings in a unit.
 
     Attributes:
@@ -91,7 +91,7 @@ def equations(
     method: str,
     span: tuple[float, float],
     exchange: bool = False,
-) -> Equations:
+) -> UnitEquations:
     """Build the integrator of a model with held inputs.
 
     Raises:
@@ -114,7 +114,7 @@ def equations(
     d = np.concatenate([model.values("p"), model.values("u")])
     integrator = integrator.suited([(guess, d)], span[1] - span[0])
     y0 = integrator.start(guess, d)
-    return Equations(model, integrator, y0, rtol, step, method, span, exchange)
+    return UnitEquations(model, integrator, y0, rtol, step, method, span, exchange)
 
 
 def _places(integrator: Integrator) -> list[int]:
@@ -123,7 +123,7 @@ def _places(integrator: Integrator) -> list[int]:
     return [names.index(v.name) for v in integrator.model.z]
 
 
-def header(own: Equations, token: str) -> str:
+def header(own: UnitEquations, token: str) -> str:
     """Return sizes and settings of a model as C."""
     model, system = own.model, own.integrator.system
     manifold, crossings = system.manifold, own.integrator.crossings
@@ -174,7 +174,7 @@ def header(own: Equations, token: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-def source(own: Equations) -> str:
+def source(own: UnitEquations) -> str:
     """Return tables and functions of a model as C."""
     system, integrator = own.integrator.system, own.integrator
     model, y, d = own.model, system.y, system.d
@@ -213,7 +213,7 @@ def source(own: Equations) -> str:
     return "".join(text)
 
 
-def _along(own: Equations) -> ca.Function:
+def _along(own: UnitEquations) -> ca.Function:
     """Return (t, y, d, dy, dd) -> derivatives of rates, signals and equations along (dy, dd)."""
     model, system = own.model, own.integrator.system
     t, y, d = ca.SX.sym("t"), system.y, system.d
@@ -240,7 +240,7 @@ def _called(name: str, of: str, arguments: int, results: int) -> str:
     )
 
 
-def _events(own: Equations) -> Iterator[str]:
+def _events(own: UnitEquations) -> Iterator[str]:
     """Yield the C of events: search, effects, values, values at the start and names."""
     events, crossings = own.model.events, own.integrator.crossings
     if crossings is not None and own.exchange:  # the importer searches
@@ -262,7 +262,7 @@ def _events(own: Equations) -> Iterator[str]:
         yield _strings("model_event_names", [event.name for event in events])
 
 
-def tables(own: Equations) -> str:
+def tables(own: UnitEquations) -> str:
     """Return names, start values and ranges as C."""
     model, system = own.model, own.integrator.system
     data = [*model.values("p"), *model.values("u")]

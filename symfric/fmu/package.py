@@ -14,7 +14,7 @@ from pathlib import Path
 from xml.etree import ElementTree as Xml
 from zipfile import ZIP_DEFLATED, ZipFile
 
-from symfric.fmu.equations import Equations
+from symfric.fmu.equations import UnitEquations
 from symfric.fmu.variables import Entry
 from symfric.foundation.files import written
 from symfric.foundation.programs import CompileError, Compiler, find_compiler
@@ -27,7 +27,7 @@ INTERVALS = 200
 
 
 def described(
-    own: Equations, identifier: str, token: str, entries: Iterable[Entry], fmi: int
+    own: UnitEquations, identifier: str, token: str, entries: Iterable[Entry], fmi: int
 ) -> str:
     """Return the text of modelDescription.xml.
 
@@ -201,7 +201,7 @@ def fixed_text(name: str) -> str:
     return (SOURCES / name).read_text(encoding="utf-8")
 
 
-def sources(own: Equations, sizes: str, model: str, fmi: int) -> dict[str, str]:
+def sources(own: UnitEquations, sizes: str, model: str, fmi: int) -> dict[str, str]:
     """Return the texts of the C files of a unit, by name; `all.c` includes the others.
 
     Args:

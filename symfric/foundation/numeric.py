@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from symfric.foundation.symbolic import Symbolic
-from symfric.foundation.vector import Rows, Vector
+from symfric.foundation.vector import Vector, VectorRows
 
 Array = NDArray[np.float64]
 Scalar = Any
@@ -106,7 +106,7 @@ def erf(x: Scalar) -> Scalar:
 def column(*rows: Scalar) -> Scalar:
     """Stack `rows` into a column: shape (n, 1) for CasADi, (n, ...) for arrays."""
     if any(isinstance(row, Vector) for row in rows):
-        return Rows(rows)
+        return VectorRows(rows)
     if is_casadi(*rows):
         return ca.vertcat(*rows)
     return np.stack(np.broadcast_arrays(*rows)) if rows else np.zeros(0)
@@ -118,7 +118,7 @@ def empty(like: Scalar) -> Scalar:
     An empty DM can be concatenated with SX and MX columns and adds no operations.
     """
     if isinstance(like, Vector):
-        return Rows()
+        return VectorRows()
     return ca.DM(0, 1) if is_casadi(like) else np.zeros((0, *np.shape(like)))
 
 

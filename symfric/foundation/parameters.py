@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from symfric.foundation import checks, units
 from symfric.foundation.checks import check_names as check_names
 from symfric.foundation.numeric import Scalar, is_casadi, is_number, is_symbolic
-from symfric.foundation.shown import Shown, Table, figure_of
+from symfric.foundation.shown import Shown, TextTable, figure_of
 from symfric.foundation.variable import POSITIVE, take_si
 from symfric.foundation.variable import Variable as Variable
 
@@ -153,7 +153,7 @@ class Parametric:
         rows = [(p.name, figure_of(p.value), p.unit, p.doc) for p in parameters(self).values()]
         rows += [(o.name, o.value, "", o.doc) for o in options(self).values()]
         first = (self.__doc__ or "").partition("\n")[0]
-        table = Table(("parameter", "value", "unit", ""), tuple(rows), numbers=(1,))
+        table = TextTable(("parameter", "value", "unit", ""), tuple(rows), numbers=(1,))
         return Shown(type(self).__name__, (first,), table).html(self.thumbnail())
 
     def thumbnail(self) -> "Figure | None":

@@ -61,7 +61,7 @@ class Showing(ABC):
 
 @final
 @dataclass(frozen=True)
-class Table:
+class TextTable:
     """Table of strings.
 
     Attributes:
@@ -92,7 +92,7 @@ class Shown:
 
     title: str
     lines: tuple[str, ...] = ()
-    table: Table = Table((), ())
+    table: TextTable = TextTable((), ())
     after: tuple[str, ...] = ()
 
     def text(self) -> str:
@@ -161,7 +161,7 @@ def columns(rows: Iterable[Sequence[str]], right: Sequence[int] = ()) -> Iterato
         yield "  ".join(cells).rstrip()
 
 
-def _rows(table: Table, most: int) -> list[str]:
+def _rows(table: TextTable, most: int) -> list[str]:
     """Return the table as at most `most` aligned lines."""
     rows, lines = list(table.rows), [table.header] if any(table.header) else []
     room = most - len(lines)
@@ -173,7 +173,7 @@ def _rows(table: Table, most: int) -> list[str]:
     return [cut(f"  {line}".rstrip()) for line in found]
 
 
-def _html_table(table: Table) -> str:
+def _html_table(table: TextTable) -> str:
     def cells(row: Sequence[str], mark: str, style: str) -> str:
         right = ";text-align:right;white-space:nowrap"
         return "".join(

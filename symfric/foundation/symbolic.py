@@ -57,11 +57,11 @@ def _written(operate: Callable[..., Any], *operands: Any) -> Any:
             "with casadi.SX, and Opti takes them through model.function(...), flow or stepper"
         )
     found = operate(*map(plain, operands))
-    return Condition(found) if operate in ORDERS and type(found) is ca.SX else found
+    return SymbolicComparison(found) if operate in ORDERS and type(found) is ca.SX else found
 
 
 @final
-class Condition(ca.SX):
+class SymbolicComparison(ca.SX):
     """Comparison with a symbol; `if`, `and` and `max` of Python raise an error for it."""
 
     def __bool__(self) -> bool:

@@ -117,7 +117,7 @@ class Vector:
 
 
 @final
-class Rows(tuple[Vectors, ...]):
+class VectorRows(tuple[Vectors, ...]):
     """Column in which some rows are vectors."""
 
     __slots__ = ()

@@ -14,7 +14,7 @@ from typing import Any, final
 from matplotlib.figure import Figure
 
 from symfric.foundation.parameters import check_names
-from symfric.foundation.shown import Showing, Shown, Table
+from symfric.foundation.shown import Showing, Shown, TextTable
 
 VERDICTS = {
     "Reproduced": "observation reproduced",
@@ -90,7 +90,7 @@ class Plate(Showing):
             *(f"checked: {'; '.join(self.checked)}" for _ in self.checked[:1]),
         )
         lines = tuple(line for text in texts for line in wrap(text, 98, subsequent_indent="  "))
-        table = Table(("number", "value"), rows, numbers=(1,), rest="... {n} more")
+        table = TextTable(("number", "value"), rows, numbers=(1,), rest="... {n} more")
         return Shown(f"{self.figure}: {self.title}", lines, table)
 
     def thumbnail(self) -> Figure:

@@ -41,7 +41,7 @@ from symfric.integrator.methods.tableaux import chosen
 from symfric.integrator.prepared import check_flags, check_span, result_times, tolerances
 from symfric.integrator.running.doubts import doubts
 from symfric.integrator.running.integrator import built
-from symfric.integrator.running.record import Dense, Outputs, Run, hermite
+from symfric.integrator.running.record import Dense, Outputs, RunRecord, hermite
 from symfric.integrator.running.run import Tolerances
 from symfric.integrator.stored import trajectory_of
 from symfric.model import Model, check_model
@@ -200,7 +200,7 @@ def integrate_by_peer(
     times: Array,
     tolerances: Tolerances,
     name: str,
-) -> tuple[Run, dict[str, int]]:
+) -> tuple[RunRecord, dict[str, int]]:
     """Integrate with CasADi over `times`; after a failure, return the results before it."""
     problem = peer(system, inputs, p, tolerances, name)
     (rates, nominal), columns = rates_of(problem.system), problem.system.algebraic[1]
@@ -208,7 +208,7 @@ def integrate_by_peer(
     y = np.concatenate([y, np.zeros(problem.system.n - system.n)])
     grid = np.unique(np.concatenate([inputs.breaks, times]))
     outputs = Outputs.at(times, system.n)
-    run = Run(float(grid[0]), y[: system.n], outputs, engine=f"casadi {problem.plugin}")
+    run = RunRecord(float(grid[0]), y[: system.n], outputs, engine=f"casadi {problem.plugin}")
     found, counts = y[:, None], dict.fromkeys(COUNTS, 0)
     pieces = [np.arange(1, grid.size)]
     while pieces:

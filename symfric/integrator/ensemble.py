@@ -34,7 +34,7 @@ from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.many.chunk import Chunk, Job, Points, SingleJob, Solved, digest, suited
 from symfric.integrator.many.member_data import MemberData, MemberInput, Store, ends_of, member_data
 from symfric.integrator.many.members import program
-from symfric.integrator.methods.attempt import State
+from symfric.integrator.methods.attempt import SRow
 from symfric.integrator.methods.tableaux import chosen
 from symfric.integrator.prepared import check_flags, check_span, check_times, stopping, tolerances
 from symfric.integrator.running.doubts import of_members
@@ -307,9 +307,9 @@ def _chunk(integrator: Integrator, given: MemberData, tolerances: Tolerances, pi
     y, p = given.starts(integrator.system, pick)
     data, ends = given.data(pick), given.ends[pick]
     t_start = float(given.inputs.breaks[0])
-    S = np.ascontiguousarray(State.at(t_start, 0.0, y))
+    S = np.ascontiguousarray(SRow.at(t_start, 0.0, y))
     h = np.minimum(first_step(ends - t_start, t_start), tolerances.max_step)
-    S[:, State.H] = S[:, State.H_OLD] = h
+    S[:, SRow.H] = S[:, SRow.H_OLD] = h
     at_start = np.broadcast_to(data[:, :, 0], (y.shape[0], data.shape[1]))
     R = tolerances.given(float(given.inputs.breaks[-1]), np.hstack([p, at_start]))
     return Chunk(S, R, data, ends)

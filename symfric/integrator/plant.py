@@ -14,7 +14,7 @@ from symfric.foundation.programs import CompileError, find_compiler
 from symfric.foundation.status import SolveError, Status
 from symfric.integrator.equations.initial import consistent, first_guess
 from symfric.integrator.many.members import fastest
-from symfric.integrator.methods.attempt import Given, State
+from symfric.integrator.methods.attempt import Given, SRow
 from symfric.integrator.running.crossings import Memory
 from symfric.integrator.running.diagnosis import explain
 from symfric.integrator.running.integrator import Integrator
@@ -58,7 +58,7 @@ class Plant:
             self._advance = self._loop(integrator)
         self._look, self._seen = looking(integrator, plants, self._backend), False
         nx, one = integrator.system.nx, self._batch is None
-        states = plants.S[:, State.MEMORY : State.MEMORY + nx]
+        states = plants.S[:, SRow.MEMORY : SRow.MEMORY + nx]
         self._x: Array = states[0] if one else states
         self._u: Array = plants.u[0] if one else plants.u
 
@@ -151,7 +151,7 @@ class Plant:
         h = plants.first_step()
         remembered = Memory.new(len(self.model.events), self._tolerance)
         for b, guess, own, y in zip(which, guesses, values, found, strict=True):
-            plants.S[b] = State.at(plants.begin[b], h, y)
+            plants.S[b] = SRow.at(plants.begin[b], h, y)
             plants.R[b, Given.d(system.nx)] = np.concatenate([own, held])
             plants.R[b, Given.T_END] = plants.begin[b]
             plants.u[b], plants.count[b], plants.why[b] = held, 0, Why.END
@@ -180,7 +180,7 @@ class Plant:
     @property
     def t(self) -> Any:
         """Time [s]: a number, or with a batch one per plant, shape (batch,)."""
-        t = self._plants.S[:, State.T]
+        t = self._plants.S[:, SRow.T]
         return float(t[0]) if self._batch is None else t.copy()
 
     @property
@@ -274,7 +274,7 @@ class Plant:
             d = plants.R[b, Given.d(system.nx)].copy()
             d[d.size - nu :] = plants.u[b]
             if system.free.any() and (d != plants.R[b, Given.d(system.nx)]).any():
-                plants.S[b, State.Y] = self._integrator.consistent("stepper", guess, d)
+                plants.S[b, SRow.Y] = self._integrator.consistent("stepper", guess, d)
             plants.ready[b] = 1
         self._fresh.clear()
 
@@ -300,7 +300,7 @@ class Plant:
     def _help(self, b: int) -> tuple[Status, str] | None:
         """Prepare a plant to continue, or return the reason why it cannot."""
         plants, system = self._plants, self._integrator.system
-        t, y, d = plants.S[b, State.T], plants.S[b, State.Y], plants.R[b, Given.d(system.nx)]
+        t, y, d = plants.S[b, SRow.T], plants.S[b, SRow.Y], plants.R[b, Given.d(system.nx)]
         where = f"stepper '{self.model.name}' at t = {t:.9g} s"
         if plants.why[b] == Why.ATTEMPTS:
             return Status.MAX_STEPS, f"{where}: {Status.MAX_STEPS.value}"
@@ -312,8 +312,8 @@ class Plant:
             except ValueError as error:
                 return Status.SINGULAR, str(error)
         elif not self._found_pivots(y.copy(), d.copy()):
-            status, message = explain(self._integrator, t, y, d, float(plants.S[b, State.H]))
-            plants.S[b] = State.at(t, plants.first_step(), y.copy())  # so that a retry can work
+            status, message = explain(self._integrator, t, y, d, float(plants.S[b, SRow.H]))
+            plants.S[b] = SRow.at(t, plants.first_step(), y.copy())  # so that a retry can work
             return status, message.replace("simulate", "stepper", 1)
         plants.why[b] = Why.AGAIN
         return None

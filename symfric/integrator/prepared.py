@@ -27,7 +27,7 @@ from symfric.integrator.methods.method import Method
 from symfric.integrator.methods.tableaux import LOOSE, chosen
 from symfric.integrator.running.doubts import doubts
 from symfric.integrator.running.integrator import Integrator, built, remember
-from symfric.integrator.running.record import Run
+from symfric.integrator.running.record import RunRecord
 from symfric.integrator.running.run import MANY_STEPS, Tolerances, integrate, watchful
 from symfric.integrator.stored import statistics_of, trajectory_of
 from symfric.model import Model, check_model
@@ -152,7 +152,7 @@ class Ran(NamedTuple):
     """
 
     trajectory: Trajectory
-    run: Run
+    run: RunRecord
     integrator: Integrator
     guess: Array
     p: Array

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from symfric.foundation import checks
-from symfric.integrator.derivatives.path import Path, seeds
+from symfric.integrator.derivatives.path import RunPath, seeds
 from symfric.integrator.derivatives.sensitivity import Differentiated
 from symfric.integrator.equations.inputs import Input
 from symfric.integrator.methods.tableaux import FOR_DERIVATIVES, another
@@ -200,7 +200,7 @@ def simulate(
         basis = Basis(which, y0, tuple(run.jumps), allowed.event)
         known = trajectory.t, run.outputs.reached
         jumps = basis.jumps, basis.tolerance, known
-        path = partial(Path, own, run.dense, inputs, values, backend, y0, *jumps)
+        path = partial(RunPath, own, run.dense, inputs, values, backend, y0, *jumps)
         found = Differentiated(path, which, tuple(trajectory.units), trajectory.t)
         trajectory = replace(
             trajectory, differentiate=found.at, pull_back=found.pull_back, delays=found.delays,

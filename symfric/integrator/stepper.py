@@ -11,7 +11,7 @@ from symfric.integrator.equations.initial import first_guess, smallest_step
 from symfric.integrator.equations.inputs import InputData, input_data
 from symfric.integrator.equations.manifold import Manifold
 from symfric.integrator.equations.system import System, system
-from symfric.integrator.methods.attempt import State, build_fixed
+from symfric.integrator.methods.attempt import SRow, build_fixed
 from symfric.integrator.methods.method import suited_to_start
 from symfric.integrator.methods.tableaux import METHODS, chosen
 from symfric.integrator.plant import Numbers, Plant
@@ -88,7 +88,7 @@ def stepper(
     )
     u = np.tile(model.values("u"), (members, 1))
     d = np.hstack([np.tile(model.values("p"), (members, 1)), u])
-    start = State.at(t_start, dt, np.zeros((members, integrator.system.n)))
+    start = SRow.at(t_start, dt, np.zeros((members, integrator.system.n)))
     S, R = (np.ascontiguousarray(rows) for rows in (start, allowed.given(t_start, d)))
     count, ready, why, made = (np.zeros(members, dtype=np.int64) for _ in range(4))
     plants = Plants(

@@ -13,12 +13,12 @@ from symfric.foundation.numeric import Array
 from symfric.foundation.status import Status
 from symfric.foundation.storable import agree
 from symfric.integrator.compiled.columns import BACKENDS, Columns
-from symfric.integrator.derivatives.path import Path, Seeds
+from symfric.integrator.derivatives.path import RunPath, Seeds
 from symfric.integrator.derivatives.sensitivity import Differentiated
 from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.methods.tableaux import METHODS, key_of
 from symfric.integrator.running.integrator import Integrator, built, in_results
-from symfric.integrator.running.record import Dense, Jumps, Outputs, Run
+from symfric.integrator.running.record import Dense, Jumps, Outputs, RunRecord
 from symfric.model import Model
 from symfric.model.kinds import MODE
 from symfric.results.stored import Format, Statistics
@@ -86,7 +86,7 @@ class Stored:
 
     @classmethod
     def of(
-        cls, integrator: Integrator, inputs: InputData, run: Run, p: Array, backend: str,
+        cls, integrator: Integrator, inputs: InputData, run: RunRecord, p: Array, backend: str,
         trajectory: Trajectory, basis: Basis | None = None,
     ) -> "Stored":  # fmt: skip
         """Return the data of a run and its trajectory; recompute steps that were not kept."""
@@ -137,7 +137,7 @@ class Stored:
     def unpacked(self) -> Trajectory:
         """Return the trajectory of the stored run."""
         found = self.reached.shape[1]
-        run = Run(
+        run = RunRecord(
             float(self.steps.t0[0]),
             self.steps.y0[0],
             Outputs(self.times, self.reached, found),
@@ -201,13 +201,13 @@ class Stored:
 
         return {"differentiate": differentiate, "pull_back": pull_back, "delays": delays}
 
-    def _path(self, basis: Basis, integrator: Integrator) -> Path:
+    def _path(self, basis: Basis, integrator: Integrator) -> RunPath:
         """Return the path of the run, with pivots that are stable at its start and end."""
         if integrator.system.has_pivots:
             d = [np.concatenate([self.p, self.inputs.values[:, k]]) for k in (0, -1)]
             ends = [(basis.guess, d[0]), (self.steps.y1[-1], d[1])]
             integrator = integrator.suited(ends, float(self.steps.t1[-1] - self.steps.t0[0]))
-        return Path(
+        return RunPath(
             integrator, self.steps, self.inputs, self.p, self.backend,
             basis.guess, basis.jumps, basis.tolerance, (self.times, self.reached),
         )  # fmt: skip
@@ -240,7 +240,7 @@ def load_run(
 
 
 def statistics_of(
-    integrator: Integrator, run: Run, build_time: float, compile_time: float, run_time: float
+    integrator: Integrator, run: RunRecord, build_time: float, compile_time: float, run_time: float
 ) -> Statistics:
     """Return the statistics of a run; the arguments are times [s]."""
     evaluations, jacobians, factorisations = integrator.tableau.work(integrator.system)
@@ -264,7 +264,7 @@ def trajectory_of(
     model: Model,
     integrator: Callable[[], Integrator],
     inputs: InputData,
-    run: Run,
+    run: RunRecord,
     p: Array,
     count: Callable[[], Statistics],
     backend: str = "vm",

@@ -21,7 +21,7 @@ import numpy as np
 from symfric.foundation import checks
 from symfric.foundation.numeric import Array, is_number, is_symbolic
 from symfric.foundation.parameters import parameters, symbolise, with_values
-from symfric.foundation.shown import Showing, Shown, Table, counted, spaced
+from symfric.foundation.shown import Showing, Shown, TextTable, counted, spaced
 from symfric.foundation.units import exponents
 from symfric.laws.base import smooth
 from symfric.laws.base.law import FORCE, Law, require_law
@@ -81,7 +81,9 @@ class LawReport(Showing):
         """Return the description; long sentences continue on further lines."""
         kinds = [one.result for one in self.remarks]
         title = ", ".join(counted(kinds.count(kind), kind) for kind in ("error", "warning"))
-        return Shown(f"{self.law}: {title}", table=Table(("", "", ""), tuple(_lines(self.remarks))))
+        return Shown(
+            f"{self.law}: {title}", table=TextTable(("", "", ""), tuple(_lines(self.remarks)))
+        )
 
 
 def _lines(remarks: tuple[Remark, ...]) -> Iterator[Remark]:

@@ -15,7 +15,7 @@ import casadi as ca
 from symfric.foundation import checks, packed
 from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import Variable, check_names
-from symfric.foundation.shown import Showing, Shown, Table, among, counted, figure_of
+from symfric.foundation.shown import Showing, Shown, TextTable, among, counted, figure_of
 from symfric.foundation.variable import stacked
 from symfric.model.forces import closed, opened, reopened, with_forces
 from symfric.model.parts import Holonomic, Monitor, Output
@@ -288,7 +288,7 @@ def shown(model: System) -> Shown:
     }
     return Shown(
         f"model '{model.name}': {', '.join(c for c in counts if not c.startswith('no '))}",
-        table=Table(("name", "what", "unit", "start", ""), tuple(rows), numbers=(3,)),
+        table=TextTable(("name", "what", "unit", "start", ""), tuple(rows), numbers=(3,)),
         after=tuple(f"{what}: {text}" for what, text in lists.items() if text),
     )
 

@@ -28,7 +28,7 @@ from symfric.multibody.spatial import GROUND
 Loads = Sequence[Load | Axial]
 
 
-class Held(NamedTuple):
+class ConstraintLoads(NamedTuple):
     """Equations of a constraint, and the loads of its multipliers.
 
     Attributes:
@@ -51,9 +51,9 @@ class Held(NamedTuple):
         return (self.unit,) * len(self.labels)
 
 
-def impossible(*problems: str) -> Held:
+def impossible(*problems: str) -> ConstraintLoads:
     """Return a constraint without equations that reports the problems."""
-    return Held(ca.SX(0, 1), (), problems=problems)
+    return ConstraintLoads(ca.SX(0, 1), (), problems=problems)
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +63,7 @@ class Constraint(Part):
     kind: ClassVar[str] = "constraint"
 
     @abstractmethod
-    def held(self, kin: Kinematics) -> Held:
+    def held(self, kin: Kinematics) -> ConstraintLoads:
         """Return the equations of the constraint and the loads of its multipliers."""
 
     def contacts(self, kin: Kinematics, lam: ca.SX) -> Sequence[Contact]:
@@ -77,7 +77,7 @@ Term = tuple[Joint, str, Scalar]
 
 def linear(
     kin: Kinematics, name: str, terms: Sequence[Term], rest: Scalar, period: Scalar | None
-) -> Held:
+) -> ConstraintLoads:
     """Return the constraint rest - sum c_j s_j = 0, modulo `period` unless it is None.
 
     The multiplier is the force or moment on the last of the joints.
@@ -94,7 +94,7 @@ def linear(
     def loads(lam: ca.SX) -> Loads:
         return [Axial(joint, direction, c * lam) for joint, direction, c in terms]
 
-    return Held(phi, (f"{name}_{what}",), loads, unit)
+    return ConstraintLoads(phi, (f"{name}_{what}",), loads, unit)
 
 
 def wraps(kin: Kinematics, joint: Joint, direction: str) -> bool:
@@ -127,7 +127,7 @@ class PrescribedMotion(OnJoint, Constraint):
     motion: Callable[[ca.SX], Scalar]
     direction: str = ""
 
-    def held(self, kin: Kinematics) -> Held:
+    def held(self, kin: Kinematics) -> ConstraintLoads:
         """Return motion(t) - s = 0."""
         what = "motion: expected a function of time that returns one expression"
         try:
@@ -158,7 +158,7 @@ class UserConstraint(Constraint):
 
     expression: Callable[[Kinematics], Scalar]
 
-    def held(self, kin: Kinematics) -> Held:
+    def held(self, kin: Kinematics) -> ConstraintLoads:
         """Return the expressions, and the loads from their derivatives by the pose of each body."""
         # replace poses by symbols, to differentiate the expression by them
         motion = {GROUND: kin.motion[GROUND]}
@@ -202,4 +202,4 @@ class UserConstraint(Constraint):
                         found.append(Axial(link.joint, direction, -ca.dot(column, lam)))
             return found
 
-        return Held(ca.densify(value), numbered(self.name, value.numel()), loads)
+        return ConstraintLoads(ca.densify(value), numbered(self.name, value.numel()), loads)

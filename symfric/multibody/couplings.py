@@ -11,7 +11,7 @@ import casadi as ca
 
 from symfric.foundation.checks import shown
 from symfric.foundation.numeric import Scalar, equals, is_symbolic
-from symfric.multibody.constraints import Constraint, Held, impossible, linear, wraps
+from symfric.multibody.constraints import Constraint, ConstraintLoads, impossible, linear, wraps
 from symfric.multibody.contact import Contact, element_contact
 from symfric.multibody.element_friction import (
     CamFriction,
@@ -115,7 +115,7 @@ class RatioCoupling(Coupling):
         if equals(given, 0.0):
             yield f"{self.ratio_field}: expected a finite number other than 0, got {given!r}"
 
-    def held(self, kin: Kinematics) -> Held:
+    def held(self, kin: Kinematics) -> ConstraintLoads:
         """Return offset + ratio s_a - s_b = 0."""
         (a, along_a), (b, along_b) = ((kin.topology.joints[name], d) for name, d in self.joints())
         ratio, offset, period = self._ratio, self.offset, None
@@ -241,7 +241,7 @@ class Cam(Coupling):
     direction_a: str = "turn"
     direction_b: str = "slide"
 
-    def held(self, kin: Kinematics) -> Held:
+    def held(self, kin: Kinematics) -> ConstraintLoads:
         """Return lift(angle) - s_b = 0."""
         a, b = (kin.topology.joints[name] for name in (self.a, self.b))
         if a.linear(self.direction_a) or not b.linear(self.direction_b):
@@ -258,7 +258,7 @@ class Cam(Coupling):
             return [Axial(a, self.direction_a, -slope * lam), Axial(b, self.direction_b, lam)]
 
         phi = lift - kin.along(b, self.direction_b)[0]
-        return Held(phi, (f"{self.name}_force",), loads, "N")
+        return ConstraintLoads(phi, (f"{self.name}_force",), loads, "N")
 
     def slope_and_flank(self, kin: Kinematics, friction: Any) -> tuple[Scalar, Flank]:
         """Return the slope of the lift and the geometry of cam and follower."""

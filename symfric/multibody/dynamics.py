@@ -44,7 +44,7 @@ def twist_jacobian(phi: ca.SX, R: ca.SX, p: ca.SX) -> tuple[ca.SX, ca.SX]:
     return ca.jacobian(phi, p), ca.jacobian(turned, w)
 
 
-class Loop(NamedTuple):
+class LoopConstraints(NamedTuple):
     """Constraints of a joint that closes a loop.
 
     Attributes:
@@ -90,14 +90,14 @@ class Loop(NamedTuple):
         )
 
 
-def loop_of(kin: Kinematics, joint: Joint) -> Loop:
+def loop_of(kin: Kinematics, joint: Joint) -> LoopConstraints:
     """Return the constraints of a joint that is not in the tree."""
     relative = kin.relative(joint)
     R, p = ca.SX.sym("R", 3, 3), ca.SX.sym("p", 3)
     phi = ca.densify(joint.constraints(R, p))
     expressions, pose = [phi, *twist_jacobian(phi, R, p)], [relative.R, relative.p]
     phi, C_v, C_w = ca.substitute(expressions, [R, p], [ca.densify(part) for part in pose])
-    return Loop(joint, phi, ca.sparsify(C_v), ca.sparsify(C_w), relative)
+    return LoopConstraints(joint, phi, ca.sparsify(C_v), ca.sparsify(C_w), relative)
 
 
 def normalisations(kin: Kinematics) -> tuple[ca.SX, ca.SX, ca.SX]:

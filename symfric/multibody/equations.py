@@ -11,10 +11,10 @@ import casadi as ca
 from symfric.foundation.numeric import Scalar
 from symfric.foundation.variable import stacked, symbols_of
 from symfric.multibody.actuated import ActuatedElement
-from symfric.multibody.constraints import Constraint, Held
+from symfric.multibody.constraints import Constraint, ConstraintLoads
 from symfric.multibody.contact import Contact, joint_contacts
 from symfric.multibody.dynamics import (
-    Loop,
+    LoopConstraints,
     Wrench,
     balance,
     kinetic_energy,
@@ -53,8 +53,8 @@ class Equations:
     kin: Kinematics
     forces: tuple[Force, ...]
     loads: tuple[tuple[Load | Axial, ...], ...]
-    loops: tuple[Loop, ...]
-    held: tuple[Held, ...]
+    loops: tuple[LoopConstraints, ...]
+    held: tuple[ConstraintLoads, ...]
     turns: tuple[Turn, ...]
     norms: int
     q: ca.SX

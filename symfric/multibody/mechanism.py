@@ -12,7 +12,7 @@ from symfric.foundation import packed
 from symfric.foundation.checks import kind, many, number, shown
 from symfric.foundation.numeric import Scalar, equals
 from symfric.foundation.parameters import Variable, check_names
-from symfric.foundation.shown import Showing, Shown, Table, among, counted, figure_of
+from symfric.foundation.shown import Showing, Shown, TextTable, among, counted, figure_of
 from symfric.foundation.symbolic import plain, with_symbols
 from symfric.foundation.variable import stacked, starts_of, symbols_of
 from symfric.model import Model, Variables
@@ -25,7 +25,7 @@ from symfric.multibody.element_friction import ElementFriction
 from symfric.multibody.forces import Force, Gravity, SpringDamper
 from symfric.multibody.joint import Joint
 from symfric.multibody.prepare import (
-    Prepared,
+    Assembled,
     following,
     in_absolute_coordinates,
     project,
@@ -90,7 +90,7 @@ class Mechanism(packed.Portable, Showing):
         return Shown(
             f"mechanism '{self.name}': {counted(len(bodies), 'body', 'bodies')}, "
             f"{counted(len(self.joints), 'joint')}, {counted(loops, 'closed loop')}",
-            table=Table(("name", "what", "", "friction"), tuple(rows)),
+            table=TextTable(("name", "what", "", "friction"), tuple(rows)),
             after=(inputs,) if self.inputs else (),
         )
 
@@ -205,7 +205,7 @@ class Mechanism(packed.Portable, Showing):
         chosen = (0 if formulation == "absolute" else 1) if index is None else index
         return assemble(self.name, self.prepare(p, formulation), chosen)
 
-    def prepare(self, p: Variables = (), formulation: str = "joint") -> Prepared:
+    def prepare(self, p: Variables = (), formulation: str = "joint") -> Assembled:
         """Check the mechanism and return its equations of motion with their variables.
 
         Raises:

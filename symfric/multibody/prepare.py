@@ -38,7 +38,7 @@ The second number is for friction from reactions, which makes dense derivatives 
 
 @final
 @dataclass(frozen=True, eq=False)
-class Prepared:
+class Assembled:
     """Equations of a mechanism with their variables and start values.
 
     Attributes:
@@ -122,7 +122,7 @@ def coordinates(topology: Topology) -> tuple[Variables, Variables]:
 def written(
     topology: Topology, forces: Sequence[Force], constraints: Sequence[Constraint], p: Variables,
     u: Variables = (),
-) -> Prepared:  # fmt: skip
+) -> Assembled:  # fmt: skip
     """Return the equations of motion with independent constraints only."""
     q, qd = coordinates(topology)
     q0, qd0 = (at_start(starts_of(group), p).full().ravel() for group in (q, qd))
@@ -130,7 +130,7 @@ def written(
     arguments = topology, forces, constraints, symbols_of(q), symbols_of(qd), t
     eq = equations(*arguments)
     labels = tuple(eq.multipliers)
-    made = Prepared(eq, p, u, q, qd, q0, qd0, labels, problems=tuple(_held(eq, constraints, p)))
+    made = Assembled(eq, p, u, q, qd, q0, qd0, labels, problems=tuple(_held(eq, constraints, p)))
     if not eq.m or made.problems:
         return made
     at = made.position
@@ -167,7 +167,7 @@ def _held(eq: Equations, constraints: Sequence[Constraint], p: Variables) -> Ite
             )
 
 
-def _misfits(made: Prepared, at: Position) -> Iterator[str]:
+def _misfits(made: Assembled, at: Position) -> Iterator[str]:
     """Yield messages about constraints violated at the start, with the nearest valid values."""
     phi, J, phi_t = at(made.q0)
     speed = J @ made.qd0 + phi_t
@@ -182,7 +182,7 @@ def _misfits(made: Prepared, at: Position) -> Iterator[str]:
         yield _offer("velocities", made, speed, made.qd, following(J, made.qd0, phi_t))
 
 
-def _offer(what: str, made: Prepared, off: Array, group: Variables, near: Array | None) -> str:
+def _offer(what: str, made: Assembled, off: Array, group: Variables, near: Array | None) -> str:
     """Return the message about the largest entry of `off`.
 
     The message offers the consistent values `near` for the variables in `group`.
@@ -199,7 +199,7 @@ def _offer(what: str, made: Prepared, off: Array, group: Variables, near: Array 
 
 
 def _undetermined(
-    made: Prepared, rows: Iterable[tuple[str, ca.SX]], free: Array
+    made: Assembled, rows: Iterable[tuple[str, ca.SX]], free: Array
 ) -> tuple[str, ...]:
     """Return the joints whose `rows` depend on the combinations `free` of the multipliers."""
     pairs = [(name, ca.vec(row)[i]) for name, row in rows for i in range(row.numel())]
@@ -210,7 +210,9 @@ def _undetermined(
     return tuple(dict.fromkeys(found))
 
 
-def _fixed_already(made: Prepared, constraints: Sequence[Constraint], free: Array) -> Iterator[str]:
+def _fixed_already(
+    made: Assembled, constraints: Sequence[Constraint], free: Array
+) -> Iterator[str]:
     """Yield messages about constraints in time with multipliers in the combinations `free`.
 
     For example, two prescribed motions of one coordinate agree only at the start.
@@ -228,7 +230,7 @@ def _fixed_already(made: Prepared, constraints: Sequence[Constraint], free: Arra
                 )
 
 
-def in_absolute_coordinates(tree: Prepared, constraints: Sequence[Constraint]) -> Prepared:
+def in_absolute_coordinates(tree: Assembled, constraints: Sequence[Constraint]) -> Assembled:
     """Return the equations of the mechanism in absolute coordinates, with the same start."""
     kin = tree.eq.kin
     starts: dict[str, tuple[tuple[float, ...], tuple[float, ...]]] = {}
@@ -253,7 +255,7 @@ def in_absolute_coordinates(tree: Prepared, constraints: Sequence[Constraint]) -
     return written(topology, tree.eq.forces, constraints, tree.p, tree.u)
 
 
-def without_friction(made: Prepared) -> tuple[Array, Array, Array]:
+def without_friction(made: Assembled) -> tuple[Array, Array, Array]:
     """Return the accelerations, multipliers and normal forces at the start without friction."""
     eq = made.eq
     unknowns = ca.vertcat(eq.a, eq.lam)
@@ -273,7 +275,7 @@ def without_friction(made: Prepared) -> tuple[Array, Array, Array]:
     return x[: eq.n], x[eq.n :], solve(x, *at)[2].full().ravel()
 
 
-def with_cuts(made: Prepared) -> Equations | None:
+def with_cuts(made: Assembled) -> Equations | None:
     """Return the equations with cuts; None if cuts do not save operations.
 
     Cuts save operations in long open chains.

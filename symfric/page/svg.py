@@ -149,7 +149,7 @@ class Mark(ABC):
 
 
 @dataclass(frozen=True, eq=False)
-class Points(Mark):
+class ChartPoints(Mark):
     """Points (x, y); `entry` is their name in the legend."""
 
     x: Array
@@ -158,7 +158,7 @@ class Points(Mark):
 
 
 @final
-class Path(Points):
+class Polyline(ChartPoints):
     """Line through points."""
 
     def draw(self, frame: Frame) -> str:
@@ -174,7 +174,7 @@ class Path(Points):
 
 
 @final
-class Dots(Points):
+class Dots(ChartPoints):
     """Points, drawn as short strokes with round ends."""
 
     def draw(self, frame: Frame) -> str:
@@ -185,7 +185,7 @@ class Dots(Points):
 
 
 @final
-class Stems(Points):
+class Stems(ChartPoints):
     """Vertical lines from zero."""
 
     def draw(self, frame: Frame) -> str:
@@ -281,11 +281,11 @@ def _legend(marks: Sequence[Mark]) -> str:
     """Return the entries of the legend, at the right of the line of the title."""
     text: list[str] = []
     at = WIDTH - RIGHT
-    for mark in reversed([m for m in marks if isinstance(m, Points) and m.entry]):
+    for mark in reversed([m for m in marks if isinstance(m, ChartPoints) and m.entry]):
         at -= LETTER * len(mark.entry)
         text.append(f'<text class="entry" x="{at:.1f}" y="15">{escape(mark.entry)}</text>')
         at -= 20
-        line = isinstance(mark, Path)
+        line = isinstance(mark, Polyline)
         dots, sample = ("", f"M{at:.1f} 11h14") if line else ("dots ", f"M{at + 7:.1f} 11h0")
         text.append(f'<path class="{dots}sample {mark.kind}" d="{sample}"/>')
         at -= 12

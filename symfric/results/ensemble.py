@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from symfric.foundation import checks
 from symfric.foundation.files import write_table
 from symfric.foundation.numeric import Array
-from symfric.foundation.shown import Showing, Shown, Table, among, counted, spaced, valued
+from symfric.foundation.shown import Showing, Shown, TextTable, among, counted, spaced, valued
 from symfric.foundation.status import Status
 from symfric.foundation.storable import agree
 from symfric.results.stored import Format, module
@@ -114,7 +114,7 @@ class Ensemble(Showing):
         return Shown(
             f"ensemble of '{self.scene}': {counted(members, 'member')} at {span}",
             tuple(lines),
-            Table(header, tuple(rows), numbers=(2, 3, 4)),
+            TextTable(header, tuple(rows), numbers=(2, 3, 4)),
             ("over the members, at the last time",) if read else (),
         )
 

@@ -20,7 +20,7 @@ from symfric.foundation.parameters import Parameter, parameters
 from symfric.foundation.shown import data_uri
 from symfric.foundation.style import COLOURS
 from symfric.page import html
-from symfric.page.svg import Path as Line
+from symfric.page.svg import Polyline as Line
 from symfric.page.svg import around, chart
 from symfric.results.kinds import is_mechanism, norms
 from symfric.results.trajectory import Trajectory

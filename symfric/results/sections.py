@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from symfric.foundation import checks
 from symfric.foundation.numeric import Array
 from symfric.foundation.parameters import check_names
-from symfric.foundation.shown import Showing, Shown, Table
+from symfric.foundation.shown import Showing, Shown, TextTable
 from symfric.model import Contact
 from symfric.model.kinds import MODE
 from symfric.results.signals import Signals, extremes, integral_between
@@ -165,7 +165,7 @@ class Cycle(Showing):
             ("transient until", f"{self.settled:.6g}", "s"),
         ]
         rows.append(("difference of start and end", f"{self.error:.1g}", "of the range"))
-        return Shown(f"cycle of '{self.run.scene}'", (), Table(("", "", ""), tuple(rows), (1,)))
+        return Shown(f"cycle of '{self.run.scene}'", (), TextTable(("", "", ""), tuple(rows), (1,)))
 
 
 def cycle(run: Signals, section: ca.SX | None, tolerance: float) -> Cycle:

@@ -14,7 +14,7 @@ import numpy as np
 from symfric.foundation import checks, packed
 from symfric.foundation.files import write_table, write_text
 from symfric.foundation.numeric import Array, Scalar
-from symfric.foundation.shown import Showing, Shown, Table, among, counted
+from symfric.foundation.shown import Showing, Shown, TextTable, among, counted
 from symfric.foundation.variable import stacked
 from symfric.model.kinds import WORK
 from symfric.model.model import friction
@@ -61,7 +61,7 @@ class EnergyBalance(Showing):
         rows += [("unexplained, at most", f"{np.abs(self.defect).max():.3g}")]
         title = f"energy from {self.t[0]:g} to {self.t[-1]:g} s"
         after = f"unexplained over what moved: {self.relative:.2g}"
-        return Shown(title, (), Table(("", "J"), tuple(rows), numbers=(1,)), (after,))
+        return Shown(title, (), TextTable(("", "J"), tuple(rows), numbers=(1,)), (after,))
 
     @property
     def relative(self) -> float:
@@ -143,7 +143,7 @@ class Trajectory(packed.Portable, Signals):
         if "further" in self.model.__dict__ and self.details:
             after.append(f"further: {among(self.details)}")
         header = ("signal", "unit", "first", "last", "least", "greatest")
-        table = Table(header, tuple(self._rows(known)), numbers=(2, 3, 4, 5))
+        table = TextTable(header, tuple(self._rows(known)), numbers=(2, 3, 4, 5))
         title = f"run of '{self.scene}' from {first:g} to {last:g} s"
         return Shown(title, tuple(lines), table, tuple(after))
 

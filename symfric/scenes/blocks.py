@@ -17,7 +17,7 @@ from symfric.model.kinds import FRICTION
 from symfric.model.parts import Sketch
 from symfric.scenes import fields
 from symfric.scenes.base import GivenInput, Scene, contact, friction_outputs, other_law, structure
-from symfric.scenes.drawing import Block, around, drawn
+from symfric.scenes.drawing import RailBody, around, drawn
 
 
 def sine(t: ca.SX) -> ca.SX:
@@ -74,11 +74,11 @@ class Drive(Scene):
     def _sketch(self, x: ca.SX) -> Sketch:
         """Return the mass on its guide, or a rotating hand."""
         if self.turning:
-            hub = Block(0.0, 0.0, "", "v", self.law, contact="guide")
+            hub = RailBody(0.0, 0.0, "", "v", self.law, contact="guide")
             arrows = [("x v", (0.0, 0.0), "turn y"), ("force", (0.0, 0.0), "turn y")]
             return drawn({}, hands={"axis": (x, 1.0)}, hub=hub, arrows=arrows)
         return drawn(
-            {"mass": Block(x, 0.0, "x", "v", self.law, "m", "guide")},
+            {"mass": RailBody(x, 0.0, "x", "v", self.law, "m", "guide")},
             arrows=[("x v", "mass", "x"), ("force", "mass", "x")],
         )
 
@@ -142,7 +142,7 @@ class Rabinowicz(Scene):
         way = 0.15 * self.m * self.g / self.k if not equals(self.k, 0.0) else 1.0
         marks = [(around(self.v_belt * t + i * way / 3, -way, 2 * way), 0.0) for i in range(9)]
         return drawn(
-            {"block": Block(x, 0.0, "x", "v_rel", self.law, "m", "belt")},
+            {"block": RailBody(x, 0.0, "x", "v_rel", self.law, "m", "belt")},
             {"wall": (-way, 0.0)},
             [("spring", "wall", "block", "k")],
             ticks=marks,
@@ -237,8 +237,8 @@ class CoupledBlocks(Scene):
         marks = [(around(self.v_belt * t + i * way / 3, -way, 4 * way), 0.0) for i in range(15)]
         return drawn(
             {
-                "block_1": Block(x_1, 0.0, "x", "v_rel_1", self.law, "m_1", "block_1"),
-                "block_2": Block(
+                "block_1": RailBody(x_1, 0.0, "x", "v_rel_1", self.law, "m_1", "block_1"),
+                "block_2": RailBody(
                     x_2 + 2 * way, 0.0, "x", "v_rel_2", self.law_of("block_2"), "m_2", "block_2"
                 ),
             },

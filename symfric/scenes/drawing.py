@@ -26,7 +26,7 @@ DIRECTIONS = {"y": (1.0, 0.0, 0.0), "z": (0.0, 1.0, 0.0), "x": (0.0, 0.0, 1.0)}
 
 @final
 @dataclass(frozen=True, eq=False)
-class Block:
+class RailBody:
     """Body on a rail in a drawing.
 
     Attributes:
@@ -48,12 +48,12 @@ class Block:
 
 
 def drawn(
-    blocks: Mapping[str, Block],
+    blocks: Mapping[str, RailBody],
     fixed: Mapping[str, tuple[Scalar, Scalar]] | None = None,
     links: Sequence[tuple[str, str, str, str]] = (),
     hands: Mapping[str, tuple[Scalar, float]] | None = None,
     ticks: Sequence[tuple[Scalar, Scalar]] = (),
-    hub: Block | None = None,
+    hub: RailBody | None = None,
     arrows: Sequence[tuple[str, str | tuple[Scalar, Scalar], str]] = (),
     layout: Sketch | None = None,
 ) -> Sketch:
@@ -115,11 +115,11 @@ def around(way: Scalar, low: Scalar, high: Scalar) -> ca.SX:
     return ca.SX(way - length * ca.floor((way - low) / length))
 
 
-def _contacts(block: Block) -> tuple[str, ...]:
+def _contacts(block: RailBody) -> tuple[str, ...]:
     return (block.contact,) if block.contact else ()
 
 
-def _slips(block: Block) -> tuple[tuple[str, float], ...]:
+def _slips(block: RailBody) -> tuple[tuple[str, float], ...]:
     """Return the sliding velocity of a block and the velocity scale of its law, as in `Mark`."""
     if not block.slip or block.law is None:
         return ()

@@ -23,7 +23,7 @@ from symfric.model import Model, Monitor, Output, Variables
 from symfric.model.parts import Sketch
 from symfric.scenes import fields
 from symfric.scenes.base import GivenInput, Scene, contact, friction_outputs
-from symfric.scenes.drawing import Block, drawn
+from symfric.scenes.drawing import RailBody, drawn
 
 
 def strokes(t: ca.SX) -> ca.SX:
@@ -91,7 +91,7 @@ class Prescribed(Scene):
             outputs=friction_outputs(slip, "v")
             | ({"N": Output(N, "N", "normal force")} if varying else {}),
             sketch=lambda: drawn(
-                {"sample": Block(x.symbol, 0.0, "x", "v", self.law, contact="sample")},
+                {"sample": RailBody(x.symbol, 0.0, "x", "v", self.law, contact="sample")},
                 arrows=[("x", "sample", "x"), ("v", "sample", "x")],
             ),
         )
@@ -216,8 +216,8 @@ class QuarterCar(Scene):
         wheel, body = 0.5 * self.L_d, 1.5 * self.L_d
         return drawn(
             {
-                "wheel": Block(0.0, X_w + wheel, label="M_w"),
-                "body": Block(0.0, X_b + body, "z", "v_b", self.law, "M_b", "guide"),
+                "wheel": RailBody(0.0, X_w + wheel, label="M_w"),
+                "body": RailBody(0.0, X_b + body, "z", "v_b", self.law, "M_b", "guide"),
             },
             {"road": (0.0, X_r)},
             [("strut", "road", "wheel", "k_t, b_t"), ("strut", "wheel", "body", "k_s, b_d")],

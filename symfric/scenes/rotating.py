@@ -16,7 +16,7 @@ from symfric.model import Model, Output, Variables
 from symfric.model.parts import Sketch
 from symfric.scenes import fields
 from symfric.scenes.base import GivenInput, Scene, contact, friction_outputs, structure
-from symfric.scenes.drawing import Block, drawn
+from symfric.scenes.drawing import RailBody, drawn
 
 
 def closing(t: ca.SX) -> ca.SX:
@@ -102,11 +102,11 @@ class Clutch(Scene):
         rims = {f"rim_{i}_{k}": (s * 0.06, z) for i, s in ((1, -1.0), (2, 1.0))
                 for k, z in ((1, -0.2), (2, 0.2))}  # fmt: skip
         return drawn(
-            {"engine": Block(-1.0, 0.0, label="J_1"), "load": Block(1.0, 0.0, label="J_2")},
+            {"engine": RailBody(-1.0, 0.0, label="J_1"), "load": RailBody(1.0, 0.0, label="J_2")},
             plates | rims,
             [("rod", "engine", "face_1", ""), ("rod", "face_2", "load", "")]
             + [("rod", f"rim_{i}_1", f"rim_{i}_2", "") for i in (1, 2)],
-            hub=Block(0.0, 0.0, "", "v_rel", self.law, contact="plates"),
+            hub=RailBody(0.0, 0.0, "", "v_rel", self.law, contact="plates"),
             arrows=[("w_1", "engine", "turn x"), ("T_1", "engine", "turn x"),
                     ("w_2", "load", "turn x"), ("T_2", "load", "turn -x"),
                     ("pressure", (-0.5, 0.0), "x")],
@@ -206,7 +206,7 @@ class DrillString(Scene):
         In a schematic, the string is seen from aside.
         """
         hands = {"bit": (phi, 0.7), "top": (phi + ca.sum1(twists), 1.0)}
-        hub = Block(0.0, 0.0, "", "v_rel", self.law, contact="rock")
+        hub = RailBody(0.0, 0.0, "", "v_rel", self.law, contact="rock")
         return drawn({}, hands=hands, hub=hub, layout=self._layout())
 
     def _layout(self) -> Sketch:
@@ -215,7 +215,7 @@ class DrillString(Scene):
         bodies = [*(f"lump_{i}" for i in range(1, self.lumps)), "bit"]
         J = [*("J_string / n" for _ in bodies[1:]), "J_bit"]
         blocks = {
-            name: Block(0.0, -1.0 * i, label=label)
+            name: RailBody(0.0, -1.0 * i, label=label)
             for i, (name, label) in enumerate(zip(bodies, J, strict=True), start=1)
         }
         pairs = zip(["top", *bodies], bodies, strict=False)
@@ -223,7 +223,7 @@ class DrillString(Scene):
             blocks,
             {"top": (0.0, 0.0)},
             [("strut", a, b, "n k, n c") for a, b in pairs],
-            hub=Block(0.0, -1.0 * self.lumps, contact="rock"),
+            hub=RailBody(0.0, -1.0 * self.lumps, contact="rock"),
             arrows=[("w_top", "top", "turn z"), ("N", "bit", "-z")]
             + [(name, body, "turn z") for name, body in zip(names, bodies, strict=True)],
         )
@@ -315,12 +315,12 @@ class Nip(Scene):
     def _sketch(self) -> Sketch:
         """Return both rollers with the web between them, and the shaft's spring, at rest."""
         return drawn(
-            {"chill_roll": Block(0.0, 1.6), "roller": Block(0.0, -1.0, label="J")},
+            {"chill_roll": RailBody(0.0, 1.6), "roller": RailBody(0.0, -1.0, label="J")},
             {"rim": (0.0, 3.2), "rim_roller": (0.0, -2.0), "drive": (-2.4, -1.0),
              "web_in": (-2.4, 0.0), "web_out": (2.4, 0.0)},
             [("circle", "chill_roll", "rim", ""), ("circle", "roller", "rim_roller", "R"),
              ("rod", "web_in", "web_out", ""), ("strut", "drive", "roller", "k, d")],
-            hub=Block(0.0, 0.0, "", "v_rel", self.law, contact="web"),
+            hub=RailBody(0.0, 0.0, "", "v_rel", self.law, contact="web"),
             arrows=[("v_line", (1.8, 0.0), "x"), ("v_set", (1.8, 0.0), "x"),
                     ("w_roller", "roller", "turn y"), ("load", "roller", "z")],
         )  # fmt: skip

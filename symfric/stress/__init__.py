@@ -10,6 +10,6 @@ if TYPE_CHECKING:
     from symfric.stress.cases import Signal as Signal
     from symfric.stress.cases import draw as draw
     from symfric.stress.judge import CLASSES as CLASSES
-    from symfric.stress.judge import Verdict as Verdict
+    from symfric.stress.judge import Judgement as Judgement
 
 load_lazily(__name__)

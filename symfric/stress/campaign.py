@@ -13,7 +13,7 @@ import numpy as np
 
 from symfric.foundation.workers import Crashed, TimedOut, outcomes
 from symfric.stress.cases import Case, draw
-from symfric.stress.judge import CLASSES, FAILING, Verdict, judge
+from symfric.stress.judge import CLASSES, FAILING, Judgement, judge
 from symfric.stress.problem import WORK
 
 LIMIT = 120.0
@@ -36,7 +36,7 @@ class Report:
 
     seed: int
     asked: int
-    verdicts: dict[int, Verdict]
+    verdicts: dict[int, Judgement]
     seconds: float
 
     @property
@@ -132,7 +132,7 @@ def campaign(
     for name, value in positive.items():
         if value is not None and not value > 0:
             raise ValueError(f"stress: expected {name} > 0, got {value}")
-    began, verdicts = monotonic(), dict[int, Verdict]()
+    began, verdicts = monotonic(), dict[int, Judgement]()
 
     def report() -> Report:
         return Report(seed, len(numbers), verdicts, monotonic() - began)
@@ -150,20 +150,20 @@ def campaign(
     return report()
 
 
-def rerun(case: Case, limit: float = LIMIT) -> Verdict:
+def rerun(case: Case, limit: float = LIMIT) -> Judgement:
     """Judge one case in a separate process, so that a crash is also a verdict."""
     ((_, outcome),) = outcomes(_judged, [(0, (case, WORK))], 1, limit)
     return _verdict(outcome)
 
 
-def _judged(task: tuple[Case, int]) -> Verdict:
+def _judged(task: tuple[Case, int]) -> Judgement:
     """Judge a case for a task (case, limit of work)."""
     return judge(*task)
 
 
-def _verdict(outcome: Any) -> Verdict:
+def _verdict(outcome: Any) -> Judgement:
     if isinstance(outcome, Crashed):
-        return Verdict("crash", f"{outcome.how}: {outcome.last_line}", outcome.how)
+        return Judgement("crash", f"{outcome.how}: {outcome.last_line}", outcome.how)
     if isinstance(outcome, TimedOut):
-        return Verdict("hang", f"not finished after {outcome.limit:g} s of processor time")
+        return Judgement("hang", f"not finished after {outcome.limit:g} s of processor time")
     return outcome

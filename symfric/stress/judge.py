@@ -19,7 +19,17 @@ import numpy as np
 
 from symfric import SolveError, Status, Trajectory
 from symfric.stress.cases import Case
-from symfric.stress.problem import RIGHT, TIMES, WORK, Answer, Problem, States, of, problem, table
+from symfric.stress.problem import (
+    RIGHT,
+    TIMES,
+    WORK,
+    Answer,
+    CaseProblem,
+    States,
+    of,
+    problem,
+    table,
+)
 
 CLASSES = {
     "right": "equal to the reference within ten tolerances",
@@ -54,7 +64,7 @@ RAW = ("Traceback", ".cpp:", "casadi::", "Assertion")
 
 @final
 @dataclass(frozen=True)
-class Verdict:
+class Judgement:
     """Verdict on a case.
 
     Attributes:
@@ -74,7 +84,7 @@ class Verdict:
     by: str = "methods"
 
 
-def judge(case: Case, work: int = WORK) -> Verdict:
+def judge(case: Case, work: int = WORK) -> Judgement:
     """Return the verdict on a case; exceptions due to defects of symfric are not caught.
 
     Args:
@@ -94,18 +104,18 @@ def judge(case: Case, work: int = WORK) -> Verdict:
         return _failed(ready, error)
     broken = [name for name in run.units if not np.isfinite(run[name]).all()]
     if broken:
-        return Verdict("nan", f"{', '.join(broken)}: not finite", "not finite")
+        return Judgement("nan", f"{', '.join(broken)}: not finite", "not finite")
     return _compared(ready, run)
 
 
-def _refused(group: str, sentence: str, steps: int = 0) -> Verdict:
+def _refused(group: str, sentence: str, steps: int = 0) -> Judgement:
     raw = [text for text in RAW if text in sentence]
     if raw or not sentence.strip():
-        return Verdict("crash", f"raw text instead of a sentence: {sentence}", "raw text")
-    return Verdict("refused", sentence, group, steps=steps)
+        return Judgement("crash", f"raw text instead of a sentence: {sentence}", "raw text")
+    return Judgement("refused", sentence, group, steps=steps)
 
 
-def _failed(ready: Problem, error: SolveError) -> Verdict:
+def _failed(ready: CaseProblem, error: SolveError) -> Judgement:
     """Judge a solve that reports a failure; the group states whether another method succeeds."""
     if error.status is Status.MAX_STEPS:
         return _stopped(ready, error)
@@ -117,7 +127,7 @@ def _failed(ready: Problem, error: SolveError) -> Verdict:
     return _refused(group, str(error), steps)
 
 
-def _stopped(ready: Problem, error: SolveError) -> Verdict:
+def _stopped(ready: CaseProblem, error: SolveError) -> Judgement:
     """Judge a run with too many steps, which is refused if its partial result is right."""
     run, case = error.partial, ready.case
     if not isinstance(run, Trajectory) or run.step_times.size < 2:
@@ -136,7 +146,7 @@ def _stopped(ready: Problem, error: SolveError) -> Verdict:
     return replace(begun, kind=kind, reason=text, group=group)
 
 
-def _compared(ready: Problem, run: Trajectory) -> Verdict:
+def _compared(ready: CaseProblem, run: Trajectory) -> Judgement:
     """Judge a run by the referee or by other methods; if they cannot decide, by each step."""
     answer = ready.answered()
     if answer is None or answer.doubt[1:].min() > DOUBT:
@@ -154,13 +164,13 @@ def _compared(ready: Problem, run: Trajectory) -> Verdict:
     return replace(verdict, kind="loose", reason=text, group=f"{verdict.group}, each step is right")
 
 
-def _by_referee(ready: Problem, run: Trajectory, answer: Answer) -> Verdict:
+def _by_referee(ready: CaseProblem, run: Trajectory, answer: Answer) -> Judgement:
     """Judge a run by the referee while its error is small, and by other methods afterwards."""
     sure = int(np.argmax(answer.doubt > DOUBT)) or TIMES
     over_time = ready.apart(table(run, ready.times), answer.states).max(0)
     error, steps = float(over_time[:sure].max()), run.statistics.steps
     if sure == TIMES and error <= RIGHT:
-        return Verdict("right", "", "", error, steps, "referee")
+        return Judgement("right", "", "", error, steps, "referee")
     if error <= RIGHT:
         return by_methods(ready, run)
     if sure < TIMES:
@@ -169,9 +179,9 @@ def _by_referee(ready: Problem, run: Trajectory, answer: Answer) -> Verdict:
     return replace(_graded(ready, run, answer.states, error, answer), by="referee")
 
 
-def by_methods(ready: Problem, run: Trajectory) -> Verdict:
+def by_methods(ready: CaseProblem, run: Trajectory) -> Judgement:
     """Judge a run by methods of other families at decreasing tolerances."""
-    verdicts = list[Verdict]()
+    verdicts = list[Judgement]()
     for factor in LADDER:
         verdicts.append(_by_two(ready, run, max(factor * ready.case.rtol, FINEST)))
         if verdicts[-1].kind != "undecided" or verdicts[-1].group in ("sensitive", SUSPECT):
@@ -179,7 +189,7 @@ def by_methods(ready: Problem, run: Trajectory) -> Verdict:
     return verdicts[0]
 
 
-def _by_two(ready: Problem, run: Trajectory, rtol: float) -> Verdict:
+def _by_two(ready: CaseProblem, run: Trajectory, rtol: float) -> Judgement:
     """Judge a run by a method at `rtol` and, if needed, another method at a tenth of it."""
     steps = run.statistics.steps
     limit = ready.patience(run)
@@ -187,49 +197,49 @@ def _by_two(ready: Problem, run: Trajectory, rtol: float) -> Verdict:
     if not isinstance(reference, SolveError):
         error = ready.distance(run, of(reference))
         if error <= RIGHT:
-            return Verdict("right", "", "", error, steps)
+            return Judgement("right", "", "", error, steps)
     third = ready.attempt(max(rtol / 10, FINEST), ready.third, limit)
     if isinstance(third, SolveError):
         failed = reference if isinstance(reference, SolveError) else third
         text = f"the reference failed: {failed}"
-        return Verdict("undecided", text, f"reference: {failed.status.name}", None, steps)
+        return Judgement("undecided", text, f"reference: {failed.status.name}", None, steps)
     error = ready.distance(run, of(third))
     if error <= RIGHT:
-        return Verdict("right", "", "", error, steps)
+        return Judgement("right", "", "", error, steps)
     if isinstance(reference, SolveError):
         text = f"{error:.3g} tolerances off one reference; the other failed: {reference}"
-        return Verdict("undecided", text, f"reference: {reference.status.name}", error, steps)
+        return Judgement("undecided", text, f"reference: {reference.status.name}", error, steps)
     doubt = ready.distance(reference, of(third))
     if doubt > error / 3:
         text = f"{error:.3g} tolerances off, and the references disagree by {doubt:.3g}"
-        return Verdict("undecided", text, "references disagree", error, steps)
+        return Judgement("undecided", text, "references disagree", error, steps)
     return _graded(ready, run, of(third), error)
 
 
 def _graded(
-    ready: Problem,
+    ready: CaseProblem,
     run: Trajectory,
     truth: States,
     error: float,
     answer: Answer | None = None,
-) -> Verdict:
+) -> Judgement:
     """Judge a run with a large error by the growth of one tolerance in the problem."""
     steps, y = run.statistics.steps, truth(ready.times)
     grown = ready.amplification(y, ready.patience(run), answer)
     text = f"{error:.3g} tolerances off; the problem amplifies one to {grown:.3g}"
     if error <= LOOSE or ready.at_steps(run, truth) <= LOOSE:
-        return _explained(ready, run, truth, Verdict("loose", text, "", error, steps), grown)
+        return _explained(ready, run, truth, Judgement("loose", text, "", error, steps), grown)
     if error <= max(LOOSE, steps) * grown:
         if error * ready.case.rtol < SENSITIVE:
-            return _explained(ready, run, truth, Verdict("loose", text, "", error, steps), grown)
+            return _explained(ready, run, truth, Judgement("loose", text, "", error, steps), grown)
         group = "sensitive" if grown * ready.case.rtol > SENSITIVE else SUSPECT
-        return Verdict("undecided", text, group, error, steps)
-    return Verdict("silent", text, "", error, steps)
+        return Judgement("undecided", text, group, error, steps)
+    return Judgement("silent", text, "", error, steps)
 
 
 def _explained(
-    ready: Problem, run: Trajectory, truth: States, loose: Verdict, grown: float
-) -> Verdict:
+    ready: CaseProblem, run: Trajectory, truth: States, loose: Judgement, grown: float
+) -> Judgement:
     """Return a loose verdict with the measured reason of its error."""
     error, text = loose.error or 0.0, loose.reason
     if error <= RIGHT * grown:

@@ -75,7 +75,7 @@ class Answer:
 
 @final
 @dataclass(frozen=True, eq=False)
-class Problem:
+class CaseProblem:
     """Model and data of a case, ready to run.
 
     Attributes:
@@ -302,7 +302,7 @@ class Problem:
         return answer
 
 
-def problem(case: Case, work: int = WORK) -> Problem:
+def problem(case: Case, work: int = WORK) -> CaseProblem:
     """Return the model of a case.
 
     Raises:
@@ -316,7 +316,7 @@ def problem(case: Case, work: int = WORK) -> Problem:
         known = parameters(ALL_SCENES[case.scene](law))
         scene = with_values(scene, {name: known[name].value for name in p})
     inputs = {name: signal(s) for name, s in case.inputs.items()}
-    return Problem(case, scene.model(free=case.free), inputs, p, work)
+    return CaseProblem(case, scene.model(free=case.free), inputs, p, work)
 
 
 def signal(s: Signal) -> Input:

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.stress.referee_equations import DYNAMIC, LAWS, SCENES, Force, Scene
+from symfric.stress.referee_equations import DYNAMIC, LAWS, SCENES, Force, RefereeScene
 
 Array = NDArray[np.float64]
 EVALUATIONS = 150_000
@@ -107,12 +107,12 @@ def knows(law: str, scene: str) -> bool:
     return law in LAWS and scene in SCENES and (law, scene) not in UNKNOWN
 
 
-class Motion:
+class SmoothPiece:
     """Equations between two kinks: rates of all states, with friction from the laws."""
 
     def __init__(self, asked: Question, a: float, b: float) -> None:
         force = asked.signal.between(a, b)
-        self.scene: Scene = SCENES[asked.scene](asked.p, force, (a + b) / 2)
+        self.scene: RefereeScene = SCENES[asked.scene](asked.p, force, (a + b) / 2)
         self.rub = partial(LAWS[asked.law], asked.p, asked.forms)
         self.count = int(asked.law in DYNAMIC)
         self.by_modes = asked.law == "exact_coulomb"
@@ -170,7 +170,7 @@ def solve(asked: Question, rtol: float = 1e-10) -> Array:
     cuts = [begin, *sorted(t for t in kinks if begin < t < end), end]
     y, found = np.array(asked.y, float), np.empty((asked.y.size, asked.times.size))
     for a, b in pairwise(cuts):
-        motion = Motion(asked, a, b)
+        motion = SmoothPiece(asked, a, b)
         here = (asked.times >= a) & (asked.times <= b)
         way = by_events if motion.by_modes else by_lsoda
         states, y = way(motion, y, asked.times[here], (a, b), rtol, asked)
@@ -181,7 +181,12 @@ def solve(asked: Question, rtol: float = 1e-10) -> Array:
 
 
 def by_lsoda(
-    motion: Motion, y: Array, times: Array, span: tuple[float, float], rtol: float, asked: Question
+    motion: SmoothPiece,
+    y: Array,
+    times: Array,
+    span: tuple[float, float],
+    rtol: float,
+    asked: Question,
 ) -> tuple[Array, Array]:
     """Return states at `times` and at the end, integrated by LSODA."""
     from scipy.integrate import odeint  # noqa: PLC0415  (slow to import)
@@ -202,7 +207,12 @@ def by_lsoda(
 
 
 def by_events(
-    motion: Motion, y: Array, times: Array, span: tuple[float, float], rtol: float, asked: Question
+    motion: SmoothPiece,
+    y: Array,
+    times: Array,
+    span: tuple[float, float],
+    rtol: float,
+    asked: Question,
 ) -> tuple[Array, Array]:
     """Return states at `times` and at the end, integrated from event to event."""
     from scipy.integrate import solve_ivp  # noqa: PLC0415  (slow to import)
@@ -234,7 +244,7 @@ def by_events(
 
 
 def ending(
-    motion: Motion, i: int, mode: float, mu_s: float, begun: float
+    motion: SmoothPiece, i: int, mode: float, mu_s: float, begun: float
 ) -> Callable[[float, Array], float]:
     """Return a function of time and states that passes through zero when a mode ends."""
     velocity, rest = motion.scene.slides[i]

@@ -200,7 +200,7 @@ class UnsolvableError(ArithmeticError):
 
 
 @dataclass(frozen=True)
-class Scene:
+class RefereeScene:
     """Equations of a machine and the sliding velocities of its contacts.
 
     Attributes:
@@ -216,7 +216,7 @@ class Scene:
     breaks: tuple[float, ...] = ()
 
 
-def belt(p: Numbers, _: Force, __: float) -> Scene:
+def belt(p: Numbers, _: Force, __: float) -> RefereeScene:
     """Block on a belt.
 
     x' = v,   m v' = -k x - F(v - v_belt, m g).
@@ -227,10 +227,10 @@ def belt(p: Numbers, _: Force, __: float) -> Scene:
         x, v = y
         return v, (-k * x - rub(0, v - v_belt, m * g, -k * x)) / m
 
-    return Scene(2, motion, ((1, v_belt),))
+    return RefereeScene(2, motion, ((1, v_belt),))
 
 
-def drive(p: Numbers, force: Force, _: float) -> Scene:
+def drive(p: Numbers, force: Force, _: float) -> RefereeScene:
     """Mass under a force.
 
     x' = v,   m v' = force - offset - F(v, N).
@@ -240,10 +240,10 @@ def drive(p: Numbers, force: Force, _: float) -> Scene:
         pull = force(t) - p["offset"]
         return y[1], (pull - rub(0, y[1], p["N"], pull)) / p["m"]
 
-    return Scene(2, motion, ((1, 0.0),))
+    return RefereeScene(2, motion, ((1, 0.0),))
 
 
-def two_blocks(p: Numbers, _: Force, __: float) -> Scene:
+def two_blocks(p: Numbers, _: Force, __: float) -> RefereeScene:
     """Two blocks on a belt, connected by a spring.
 
     m_i v_i' = -k_i x_i +- k_c (x_2 - x_1) - F(v_i - v_belt, m_i g).
@@ -258,10 +258,10 @@ def two_blocks(p: Numbers, _: Force, __: float) -> Scene:
         a_2 = (pull_2 - rub(1, v_2 - v_belt, m_2 * g, pull_2)) / m_2
         return v_1, v_2, a_1, a_2
 
-    return Scene(4, motion, ((2, v_belt), (3, v_belt)))
+    return RefereeScene(4, motion, ((2, v_belt), (3, v_belt)))
 
 
-def quarter_car(p: Numbers, _: Force, within: float) -> Scene:
+def quarter_car(p: Numbers, _: Force, within: float) -> RefereeScene:
     """Quarter car over a road of three ramps.
 
     M_b X_b'' = f - F(X_b', N),   M_w X_w'' = -f + k_t (X_r - X_w) + b_t (X_r' - X_w'),
@@ -290,7 +290,7 @@ def quarter_car(p: Numbers, _: Force, within: float) -> Scene:
         return v_b, v_w, a_b, (tyre - f) / p["M_w"]
 
     kinks = tuple(time for _, a, d in ramps for time in (a, a + d))
-    return Scene(4, motion, ((2, 0.0),), kinks)
+    return RefereeScene(4, motion, ((2, 0.0),), kinks)
 
 
 def length(*forces: float) -> float:
@@ -298,7 +298,7 @@ def length(*forces: float) -> float:
     return hypot(*forces, WIDTH) - WIDTH
 
 
-def pendulum(p: Numbers, _: Force, __: float) -> Scene:
+def pendulum(p: Numbers, _: Force, __: float) -> RefereeScene:
     """(J + m L^2) phi'' = -m g L sin(phi) - R F(R phi', N), with N the force of the bearing."""
     m, L, R, g = p["m"], p["L"], p["R"], p["g"]
     inertia, guess = p["J"] + m * L**2, [m * g]
@@ -314,10 +314,10 @@ def pendulum(p: Numbers, _: Force, __: float) -> Scene:
 
         return w, *settled(accelerated, guess)
 
-    return Scene(2, motion, ((1, 0.0),))
+    return RefereeScene(2, motion, ((1, 0.0),))
 
 
-def pendulum_box(p: Numbers, _: Force, __: float) -> Scene:
+def pendulum_box(p: Numbers, _: Force, __: float) -> RefereeScene:
     """Box (x) on rough ground with a hinged pendulum (phi), and friction at ground and hinge.
 
     (m_b + m) x'' + m L (phi'' cos(phi) - phi'^2 sin(phi)) = -F(x', N_1),
@@ -341,7 +341,7 @@ def pendulum_box(p: Numbers, _: Force, __: float) -> Scene:
 
         return v, w, *settled(accelerated, guess)
 
-    return Scene(4, motion, ((2, 0.0), (3, 0.0)))
+    return RefereeScene(4, motion, ((2, 0.0), (3, 0.0)))
 
 
 def settled(
@@ -373,7 +373,7 @@ def settled(
     raise UnsolvableError
 
 
-SCENES: dict[str, Callable[[Numbers, Force, float], Scene]] = {
+SCENES: dict[str, Callable[[Numbers, Force, float], RefereeScene]] = {
     "rabinowicz": belt,
     "drive": drive,
     "coupled_blocks": two_blocks,

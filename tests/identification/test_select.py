@@ -10,7 +10,7 @@ from identification.cross import Left, cross_validate, percent, relative, shared
 from identification.data.dataset import Dataset
 from identification.fit import Fit
 from identification.residuals.points import Points
-from identification.select import Ranking, select
+from identification.select import FitRanking, select
 from symfric import Stribeck
 from symfric.foundation.status import Status
 from symfric.laws import steady_force
@@ -26,12 +26,12 @@ def points(seed: int, noise: float = 0.05, n: int = 160) -> Dataset:
 
 
 @pytest.fixture(scope="module")
-def ranking() -> Ranking:
+def ranking() -> FitRanking:
     laws = {name: name for name in ("coulomb", "coulomb+viscous", "stribeck")}
     return select({**laws, "<odd>": "stribek"}, points(1), Points(), starts=2)
 
 
-def test_the_true_law_is_first_and_the_unknown_one_last(ranking: Ranking) -> None:
+def test_the_true_law_is_first_and_the_unknown_one_last(ranking: FitRanking) -> None:
     assert [row.law for row in ranking.rows] == ["stribeck", "coulomb+viscous", "coulomb", "<odd>"]
     first = ranking.rows[0]
     assert first.status == "SOLVED"
@@ -68,7 +68,7 @@ def test_the_standard_error_is_the_spread_over_seeds() -> None:
     assert found[:, 1].mean() == pytest.approx(found[:, 0].std(), rel=0.3)
 
 
-def test_ranking_prints_plots_and_is_plain_data(ranking: Ranking) -> None:
+def test_ranking_prints_plots_and_is_plain_data(ranking: FitRanking) -> None:
     text = str(ranking)
     assert "4 folds (points)" in text
     assert "not fitted" in text.splitlines()[-1]
@@ -132,7 +132,9 @@ def test_errors_are_compared_where_all_have_some() -> None:
     assert np.isnan(relative([]))
 
 
-def test_criteria_are_those_of_the_errors_and_the_numbers_of_parameters(ranking: Ranking) -> None:
+def test_criteria_are_those_of_the_errors_and_the_numbers_of_parameters(
+    ranking: FitRanking,
+) -> None:
     first, other = ranking["stribeck"], ranking["coulomb"]
     n, better = ranking.effective, 2 * np.log(other.fitted / first.fitted)
     fewer = first.parameters - other.parameters

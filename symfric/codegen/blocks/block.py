@@ -49,7 +49,7 @@ RESERVED = frozenset(
 """Names that variables must not have."""
 
 
-class Elements(NamedTuple):
+class ElementArray(NamedTuple):
     """Neighbouring variables of a group that form an array in C, one for each identical element.
 
     Attributes:
@@ -145,7 +145,7 @@ class Block:
     use: tuple[str, ...] = ()
     limits: tuple[str, ...] = ()
     sources: tuple[str, ...] = ()
-    arrays: tuple[Elements, ...] = ()
+    arrays: tuple[ElementArray, ...] = ()
 
     def __post_init__(self) -> None:
         problems = "; ".join(self._problems())

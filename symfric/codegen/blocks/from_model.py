@@ -30,7 +30,7 @@ from symfric.integrator.methods.tableaux import METHODS, Radau
 from symfric.model import Model, Output, Variables, check_model
 
 
-class Machine(Protocol):
+class ModelSource(Protocol):
     """Protocol of scenes: objects whose `model` accepts free parameters."""
 
     def model(self, free: Iterable[str] = ()) -> Model:
@@ -39,7 +39,7 @@ class Machine(Protocol):
 
 
 def plant_block(
-    model: Model | Machine,
+    model: Model | ModelSource,
     *,
     h: float | None = None,
     method: str = "auto",
@@ -156,7 +156,7 @@ def fixed_method(where: str, model: Model, method: str) -> str:
 
 
 def _opened(
-    machine: Machine, free: Sequence[str] | None, fold: Fold
+    machine: ModelSource, free: Sequence[str] | None, fold: Fold
 ) -> tuple[Model, list[Parameter]]:
     """Return the model of a scene with variable parameters, and the constant parameters."""
     if not (isinstance(machine, Parametric) and hasattr(machine, "model")):

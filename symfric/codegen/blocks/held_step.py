@@ -23,7 +23,7 @@ overflow.
 """
 
 
-class Step(NamedTuple):
+class LawStep(NamedTuple):
     """States of a law after a step of h [s], columns.
 
     Attributes:
@@ -48,7 +48,7 @@ def advanced(
     given: Mapping[str, Scalar],
     h: ca.SX | float,
     where: str,
-) -> Step:
+) -> LawStep:
     """Return the states of a law after a step of `h` [s], their means, and their rates.
 
     v, N and the further inputs `given` are held. A sum is advanced term by term. A law with a
@@ -66,11 +66,11 @@ def advanced(
         ]
         *columns, kinds = zip(*parts, strict=True)
         columns = (ca.vertcat(*column) for column in columns)
-        return Step(*columns, kinds=tuple(dict.fromkeys(k for kind in kinds for k in kind)))
+        return LawStep(*columns, kinds=tuple(dict.fromkeys(k for kind in kinds for k in kind)))
     known = law.held_step(v, N, z, h)
     if known is not None:
         end, mean = map(ca.SX, known)
-        return Step(end, mean, (end - z) / h, ca.substitute(rate, z, end), (EVENT,))
+        return LawStep(end, mean, (end - z) / h, ca.substitute(rate, z, end), (EVENT,))
     if law.switches(v, N, z, **chosen(law, given)):
         raise ValueError(
             f"{where}: expected a law without modes, or one with its own step, got one whose "
@@ -84,7 +84,7 @@ def advanced(
 
 def held_step(
     rate: ca.SX, z: ca.SX, h: ca.SX | float, rest: ca.SX, where: str, *, each: bool = False
-) -> Step:
+) -> LawStep:
     """Return states after a step of h [s], their means over it, and their rates, as columns.
 
     States are advanced one by one; a state follows those that its rate depends on, and uses their
@@ -130,7 +130,7 @@ def held_step(
         means[i] = z[i] + h * bend
         kinds[kind] = None
     columns = (ca.vertcat(*rows) for rows in (means, rates, last))
-    return Step(z + h * ca.vertcat(*rates), *columns, kinds=tuple(kinds))
+    return LawStep(z + h * ca.vertcat(*rates), *columns, kinds=tuple(kinds))
 
 
 def _share(way: ca.SX, gap: ca.SX) -> ca.SX:

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 
-from symfric.codegen.blocks.block import RESERVED, Block, Elements
+from symfric.codegen.blocks.block import RESERVED, Block, ElementArray
 from symfric.emitter.arrays import looped
 from symfric.emitter.c99 import TRANSCENDENTAL
 from symfric.emitter.rolling import LEAST
@@ -264,14 +264,14 @@ def families(variables: Variables) -> list[Family]:
 
 def _with(block: Block, found: Mapping[str, Sequence[Family]]) -> Block:
     """Return the block with the families `found` as arrays."""
-    arrays = [Elements("state", f.name, f.rows[0], len(f.rows)) for f in found["state"]]
+    arrays = [ElementArray("state", f.name, f.rows[0], len(f.rows)) for f in found["state"]]
     first = {family.rows[0]: family for family in found["param"]}
     members = {row for family in found["param"] for row in family.rows}
     order: list[int] = []
     for row in range(len(block.parameters)):
         if row in first:
             family = first[row]
-            arrays.append(Elements("param", family.name, len(order), len(family.rows)))
+            arrays.append(ElementArray("param", family.name, len(order), len(family.rows)))
             order += family.rows
         elif row not in members:
             order.append(row)
@@ -314,7 +314,7 @@ def in_arrays(block: Block) -> Block:
     return replace(block, arrays=tuple(array for array in arrays if array.name not in taken))
 
 
-def _runs(group: str, rows: Sequence[tuple[str, object]]) -> Iterator[Elements]:
+def _runs(group: str, rows: Sequence[tuple[str, object]]) -> Iterator[ElementArray]:
     """Yield sequences of two or more identical neighbours NAME_1, NAME_2, ..."""
     first = 0
     while first < len(rows):
@@ -324,5 +324,5 @@ def _runs(group: str, rows: Sequence[tuple[str, object]]) -> Iterator[Elements]:
             while rows[first + size : first + size + 1] == [(f"{stem}_{size + 1}", kind)]:
                 size += 1
             if size > 1:
-                yield Elements(group, stem, first, size)
+                yield ElementArray(group, stem, first, size)
         first += size

@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from symfric import ExactCoulomb, SolveError, Trajectory, simulate
 from symfric.foundation.numeric import Array
 from symfric.gallery.selection.laws import FORMS, forms, small_multiples
-from symfric.gallery.self_tuning.machines import Machine, size, solve
+from symfric.gallery.self_tuning.machines import PaperMachine, size, solve
 from symfric.gallery.shared import acceleration, largest, rms, spread
 from symfric.scenes import PendulumBox
 
@@ -46,14 +46,14 @@ def balance(phi: ca.SX, v: ca.SX, w: ca.SX, unknown: ca.SX) -> ca.SX:
     )
 
 
-def smooth_coulomb() -> Machine:
+def smooth_coulomb() -> PaperMachine:
     """Return the machine; the signals are positions, velocities and accelerations."""
     x, phi, v, w = (ca.SX.sym(name) for name in ("x", "phi", "v", "w"))
     unknown = ca.SX.sym("unknown", 4)
     y, rates = ca.vertcat(x, phi, v, w), ca.vertcat(v, w, unknown[:2])
     names = ("x", "phi", "x'", "phi'", "x''", "phi''")
     shown, start = ca.vertcat(y, unknown[:2]), [0.0, np.pi / 6, 0.0, 0.0]
-    return Machine(y, rates, unknown, balance(phi, v, w, unknown), names, shown, start)
+    return PaperMachine(y, rates, unknown, balance(phi, v, w, unknown), names, shown, start)
 
 
 def at_start() -> tuple[float, float]:

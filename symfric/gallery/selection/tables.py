@@ -29,7 +29,7 @@ from symfric import ALL_LAWS, BrownMcPhee, Law, Model, SolveError, simulate
 from symfric.choice.friction import Friction
 from symfric.choice.machine import OWN
 from symfric.choice.measured import Task, measured
-from symfric.choice.ranking import WIDTH, Row
+from symfric.choice.ranking import WIDTH, RankedLaw
 from symfric.figures.regularisation import Machine, machine_of
 from symfric.foundation import checks
 from symfric.foundation.files import json_data
@@ -232,7 +232,7 @@ def _measured(machine: Machine, name: str, law: Law, T: float, S: float) -> Pape
     task = Task(
         machine, OWN, (), {"": Friction()}, None, EQUAL, 0.05, own=True, fixed=True, work=WORK,
     )  # fmt: skip
-    row: Row = measured(task, name, law)
+    row: RankedLaw = measured(task, name, law)
     t = np.linspace(0.0, machine.t_end, SAMPLES)
     run = simulate(model, machine.t_end, rtol=1e-6, t_eval=t, backend="vm")
     peer, steps = _peer(model, machine.t_end)

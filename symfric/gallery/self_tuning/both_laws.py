@@ -10,7 +10,7 @@ import numpy as np
 from symfric import BrittleSelfTuning, BrownMcPhee, Law, SelfTuning, simulate
 from symfric.foundation.numeric import Array
 from symfric.gallery.self_tuning import machines
-from symfric.gallery.self_tuning.machines import Coefficient, Machine, solve
+from symfric.gallery.self_tuning.machines import Coefficient, PaperMachine, solve
 from symfric.gallery.shared import acceleration, largest
 from symfric.scenes import Scene
 
@@ -48,14 +48,14 @@ class Both:
     """
 
     scene: Callable[[Law], Scene]
-    by_hand: Callable[[Coefficient], Machine]
+    by_hand: Callable[[Coefficient], PaperMachine]
     mu: Mapping[str, float]
     v_t: float
     rate: int
     names: tuple[str, ...]
     more: tuple[str, ...]
 
-    def machine(self, label: str, v_t: float) -> Machine:
+    def machine(self, label: str, v_t: float) -> PaperMachine:
         """Return the machine by hand with a law."""
         return self.by_hand(COEFFICIENTS[label](**self.mu, v_t=v_t))
 

@@ -21,7 +21,7 @@ Coefficient = Callable[[ca.SX, ca.SX | float], ca.SX]
 
 @final
 @dataclass(frozen=True, eq=False)
-class Machine:
+class PaperMachine:
     """Equations y' = rates(y, unknown), balance(y, unknown) = 0, y(0) = start; `shown` by name."""
 
     y: ca.SX
@@ -64,7 +64,7 @@ def own_stiffness(mu_s: float, mu_d: float, **_: float) -> Coefficient:
     return mu
 
 
-def four_mass(mu: Coefficient) -> Machine:
+def four_mass(mu: Coefficient) -> PaperMachine:
     """Return the four sliders; the signals are positions [m], velocities and accelerations."""
     g, th, x4, w, v4, a, l5, l6 = 9.8, *map(ca.SX.sym, ("th", "x4", "w", "v4", "a", "l5", "l6"))
     x1, y2 = 5 * ca.cos(th), 5 * ca.sin(th)
@@ -85,10 +85,10 @@ def four_mass(mu: Coefficient) -> Machine:
     shown = ca.vertcat(x1, y2, z3, x4, v1, v2, v3, v4, a1, a2, a3, a4)
     y, rates, unknown = ca.vertcat(th, x4, w, v4), ca.vertcat(w, v4, a, a4), ca.vertcat(a, l5, l6)
     start = [float(np.arctan2(3, 4)), 5.0, 0.0, -1.0]
-    return Machine(y, rates, unknown, balance, names, shown, start)
+    return PaperMachine(y, rates, unknown, balance, names, shown, start)
 
 
-def slider_crank(mu: Coefficient) -> Machine:
+def slider_crank(mu: Coefficient) -> PaperMachine:
     """Return crank and slider; the signals are angle [rad], position [m] and their rates."""
     m_crank, m_slider, J, r, length, R, a, g = 0.5, 5.0, 0.2, 0.08, 0.3, 0.1, 0.1, 9.8
     th, w, alpha, rod, N = map(ca.SX.sym, ("th", "w", "alpha", "rod", "N"))
@@ -111,7 +111,7 @@ def slider_crank(mu: Coefficient) -> Machine:
     names = ("crank", "crank'", "crank''", "slider", "slider'", "slider''")
     shown, unknown = ca.vertcat(th, w, alpha, x, v, acc), ca.vertcat(alpha, rod, N)
     y, rates, start = ca.vertcat(th, w), ca.vertcat(w, alpha), [0.0, 120.0]
-    return Machine(y, rates, unknown, balance, names, shown, start)
+    return PaperMachine(y, rates, unknown, balance, names, shown, start)
 
 
 def size(f: ca.SX | float) -> ca.SX:
@@ -119,7 +119,7 @@ def size(f: ca.SX | float) -> ca.SX:
     return ca.sqrt(ca.sumsqr(f) + 1e-8) - 1e-4
 
 
-def solve(machine: Machine, times: Array) -> dict[str, Array]:
+def solve(machine: PaperMachine, times: Array) -> dict[str, Array]:
     """Return the signals of the machine at `times` [s], accurate to ten digits."""
     dae = {"x": machine.y, "z": machine.unknown, "ode": machine.rates, "alg": machine.balance}
     options = {"reltol": 1e-10, "abstol": 1e-11, "max_num_steps": 200_000}
@@ -128,7 +128,7 @@ def solve(machine: Machine, times: Array) -> dict[str, Array]:
     return _shown(machine, found["xf"], found["zf"])
 
 
-def fixed_steps(machine: Machine, h: float, t_end: float) -> dict[str, Array]:
+def fixed_steps(machine: PaperMachine, h: float, t_end: float) -> dict[str, Array]:
     """Return signals every `h` [s], by the classical Runge-Kutta method of order 4."""
     unknown, ode = (
         _unknown(machine),
@@ -151,7 +151,7 @@ def fixed_steps(machine: Machine, h: float, t_end: float) -> dict[str, Array]:
     return _shown(machine, all_y[:rows, :], all_y[rows:, :])
 
 
-def _unknown(machine: Machine) -> ca.Function:
+def _unknown(machine: PaperMachine) -> ca.Function:
     """Return the Function (y, guess) -> unknowns, by Newton's method."""
     problem = {"x": machine.unknown, "p": machine.y, "g": machine.balance}
     newton = ca.rootfinder("newton", "newton", problem, {"abstol": 1e-9})
@@ -159,12 +159,12 @@ def _unknown(machine: Machine) -> ca.Function:
     return ca.Function("unknown", [y, guess], [newton(guess, y)])
 
 
-def _shown(machine: Machine, y: ca.DM, unknown: ca.DM) -> dict[str, Array]:
+def _shown(machine: PaperMachine, y: ca.DM, unknown: ca.DM) -> dict[str, Array]:
     out = ca.Function("out", [machine.y, machine.unknown], [machine.shown]).map(y.shape[1])
     return dict(zip(machine.names, np.array(out(y, unknown)), strict=True))
 
 
-def fastest(machine: Machine, y: Array) -> float:
+def fastest(machine: PaperMachine, y: Array) -> float:
     """Return the largest magnitude [1/s] of the eigenvalues of a machine at the state `y`."""
     names = ("y", "unknown", "rates", "balance")
     at, z, rates, balance = (getattr(machine, name) for name in names)

@@ -14,7 +14,7 @@ from symfric.integrator.cuda.device import Device, Kernel, Launch, kernel_of
 from symfric.integrator.many.chunk import Chunk, Job, Solved
 from symfric.integrator.many.member_data import MemberData
 from symfric.integrator.many.members import Advanced, Counts, Program, Stretch, struct, with_code
-from symfric.integrator.methods.attempt import State
+from symfric.integrator.methods.attempt import SRow
 from symfric.integrator.running.events import Stop
 from symfric.integrator.running.integrator import Integrator
 from symfric.model import Model
@@ -146,7 +146,7 @@ class OnDevice:
         count = S.shape[0]
         shape = (count, stretch.times.shape[1], self.kernel.signals)
         found, reason = np.empty(shape), np.empty(count, dtype=np.int64)
-        reach = np.stack([S[:, State.Y]] * 2, axis=1)
+        reach = np.stack([S[:, SRow.Y]] * 2, axis=1)
         first, most = 0, max(1, int(SHARE * self.device.free / member_bytes(self.kernel, stretch)))
         while first < count:
             pick = slice(first, min(first + most, count))
@@ -173,7 +173,7 @@ class OnDevice:
         (S, R, made, reach), cupy, states = columns, self.device.cupy, self.kernel.states
         real: DTypeLike = np.float32 if self.kernel.real.size < 8 else np.float64
         given: dict[str, tuple[NDArray[Any], DTypeLike]] = {
-            "S": (S.T, real), "R": (R.T, real), "t": (S[:, State.T], float),
+            "S": (S.T, real), "R": (R.T, real), "t": (S[:, SRow.T], float),
             "breaks": (stretch.breaks, float), "data": (stretch.data, real),
             "ends": (stretch.ends, float), "h_min": (stretch.h_min, float),
             "times": (stretch.times, float), "made": (made, np.int64),
@@ -188,7 +188,7 @@ class OnDevice:
         held |= {name: cupy.full(reason.shape, 0, np.int32) for name in ("interval", "next")}
         self._launch(held, stretch.numbers | {"members": reason.size})
         S[:] = held["S"].get().T
-        S[:, State.T], made[:] = held["t"].get(), held["made"].get()
+        S[:, SRow.T], made[:] = held["t"].get(), held["made"].get()
         reach[:, :, :states] = held["reach"].get().transpose(2, 0, 1)
         found[:], reason[:] = held["out"].get(), held["reason"].get()
 

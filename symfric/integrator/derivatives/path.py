@@ -111,7 +111,7 @@ Opening = tuple[int, tuple[Jump | Break | None, ...]]
 
 @final
 @dataclass(frozen=True, eq=False)
-class Path:
+class RunPath:
     """Accepted steps of a run, and the data with which they were made.
 
     Attributes:

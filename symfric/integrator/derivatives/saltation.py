@@ -37,7 +37,7 @@ from numpy.typing import NDArray
 from symfric.foundation.checks import listed
 from symfric.foundation.numeric import Array
 from symfric.integrator.derivatives.functions import derivatives
-from symfric.integrator.derivatives.path import Jump, Path
+from symfric.integrator.derivatives.path import Jump, RunPath
 from symfric.integrator.equations.initial import ASSEMBLED, ITERATIONS, consistent
 
 Which = Sequence[int] | NDArray[np.intp]
@@ -74,7 +74,7 @@ class Links(NamedTuple):
     alone: Array
 
 
-def links(path: Path) -> Links:
+def links(path: RunPath) -> Links:
     """Return the links of a run.
 
     Raises:
@@ -111,13 +111,13 @@ def then(first: Array, *others: Array) -> Array:
     return first
 
 
-def at_start(path: Path) -> Array:
+def at_start(path: RunPath) -> Array:
     """Return the passage from the given to the consistent start values."""
     here = _Instants(path, path.dense.t0[:1], path.data(np.zeros(1, dtype=np.intp)))
     return here.consistent(here.nothing, path.guess, path.dense.y0[:1])[0]
 
 
-def _passages(path: Path) -> Array:
+def _passages(path: RunPath) -> Array:
     """Return the passages of all events of a run."""
     n, n_d = path.integrator.system.n, path.steps[2].shape[1]
     found = np.empty((len(path.jumps), n + 1, n + 1 + n_d))
@@ -132,7 +132,7 @@ def _passages(path: Path) -> Array:
     return found
 
 
-def _is_single(path: Path, jump: Jump) -> bool:
+def _is_single(path: RunPath, jump: Jump) -> bool:
     """Return True if a single event cut a step, away from breaks, and there are no constraints."""
     if len(jump.which) > 1 or not jump.size or path.integrator.system.manifold is not None:
         return False
@@ -163,7 +163,7 @@ def _passage(here: "_Instants") -> Array:
     return _crossed(here, rate)
 
 
-def event_times(path: Path, jump: Jump) -> Array:
+def event_times(path: RunPath, jump: Jump) -> Array:
     """Return the passage to the times of simultaneous events, shape (events, n + 1 + n_d)."""
     here = _Instants.of(path, [jump])
     rate = here.rates_before()
@@ -242,7 +242,7 @@ class _Instants(NamedTuple):
         before, after: unknowns before and after the events.
     """
 
-    path: Path
+    path: RunPath
     t: Array
     d: Array
     jumps: Sequence[Jump] = ()
@@ -250,7 +250,7 @@ class _Instants(NamedTuple):
     after: Array = NOTHING
 
     @classmethod
-    def of(cls, path: Path, jumps: Sequence[Jump]) -> "_Instants":
+    def of(cls, path: RunPath, jumps: Sequence[Jump]) -> "_Instants":
         """Return the instants of events."""
         d = path.data(np.array([path.place(jump) for jump in jumps]))
         before = np.array([jump.before for jump in jumps])

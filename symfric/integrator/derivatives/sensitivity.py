@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from symfric.foundation.numeric import Array
 from symfric.integrator.derivatives.functions import derivatives
-from symfric.integrator.derivatives.path import Jump, Path, Seeds, of_data
+from symfric.integrator.derivatives.path import Jump, RunPath, Seeds, of_data
 from symfric.integrator.derivatives.saltation import Links, at_start, event_times, links
 from symfric.integrator.running.record import Dense
 
@@ -36,7 +36,7 @@ class Slopes(NamedTuple):
     times: Array
 
 
-def forward(path: Path, which: Seeds) -> Slopes:
+def forward(path: RunPath, which: Seeds) -> Slopes:
     """Return the derivatives of the solution with respect to all names, in one sweep over steps."""
     n, names, linked = path.integrator.system.n, len(which.names), path.linked
     state, of_d = np.zeros((n + 1, names)), of_data(which.parameters, path.steps[2].shape[1])
@@ -62,7 +62,7 @@ def _after(passage: Array, state: Array, of_d: Array) -> Array:
     return passage @ np.vstack([state, of_d])
 
 
-def _dense(path: Path, start: Array, behind: Array, inner: Array) -> Dense:
+def _dense(path: RunPath, start: Array, behind: Array, inner: Array) -> Dense:
     """Return the derivatives over all steps, from those of the start and the sweep's results."""
     steps, size = inner.shape[0], start.size
     parts = inner.reshape(steps, -1, size)
@@ -70,7 +70,7 @@ def _dense(path: Path, start: Array, behind: Array, inner: Array) -> Dense:
     return Dense(path.dense.t0, path.dense.t1, begin, parts[:, 0], parts[:, 1:])
 
 
-def _at_fixed_times(path: Path, found: Dense, states: Array) -> Dense:
+def _at_fixed_times(path: RunPath, found: Dense, states: Array) -> Dense:
     """Return the derivatives at fixed times, up to the events that cut steps.
 
     `found` holds the derivatives at fixed places in full steps; `states` holds those of the starts
@@ -117,7 +117,7 @@ def _ahead(dense: Dense, k: NDArray[np.intp], theta: Array) -> tuple[Array, Arra
     return q[0], q.sum(axis=0), bend
 
 
-def _times(path: Path, every: Links, dense: Dense, states: Array, of_d: Array) -> Array:
+def _times(path: RunPath, every: Links, dense: Dense, states: Array, of_d: Array) -> Array:
     """Return the derivatives of the times of all events, shape (events, names)."""
     found, own, names = list[Array](), iter(every.alone), of_d.shape[1]
     for step, marks in path.openings:
@@ -135,7 +135,7 @@ def _times(path: Path, every: Links, dense: Dense, states: Array, of_d: Array) -
     return np.array(found).reshape(-1, names)
 
 
-def of_signals(path: Path, which: Seeds, solution: Dense, times: Array) -> Array:
+def of_signals(path: RunPath, which: Seeds, solution: Dense, times: Array) -> Array:
     """Return the derivatives of all signals at times, shape (names, signals, times).
 
     Args:
@@ -151,7 +151,7 @@ def of_signals(path: Path, which: Seeds, solution: Dense, times: Array) -> Array
 
 
 def gradient(
-    path: Path, which: Seeds, times: Array, weights: Mapping[int, Array]
+    path: RunPath, which: Seeds, times: Array, weights: Mapping[int, Array]
 ) -> dict[str, float]:
     """Return the derivatives of sum_ij weights_ij signal_i(t_j), of the discrete solution.
 
@@ -174,7 +174,7 @@ def gradient(
     return dict(zip(which.names, found.tolist(), strict=True))
 
 
-def _swept_back(path: Path, looks: "_Looks") -> tuple[Array, Array]:
+def _swept_back(path: RunPath, looks: "_Looks") -> tuple[Array, Array]:
     """Return the adjoints of the start, before it is made consistent, and of d."""
     n, made = path.integrator.system.n, derivatives(path.integrator)
     steps = [a[::-1] for a in (*path.steps, looks.weights)]
@@ -204,7 +204,7 @@ class _Looks:
         weights: weights of start, end and dense output, one row per step.
     """
 
-    def __init__(self, path: Path, times: Array, by_y: Array) -> None:
+    def __init__(self, path: RunPath, times: Array, by_y: Array) -> None:
         t0, (steps, rows, n) = path.dense.t0, path.dense.D.shape
         self.path, self.times, self.by_y = path, times, by_y
         self.step = np.searchsorted(t0[1:], times, side="right")
@@ -246,13 +246,13 @@ class Differentiated:
         t: times of the result [s].
     """
 
-    make: Callable[[], Path]
+    make: Callable[[], RunPath]
     which: Seeds
     names: tuple[str, ...]
     t: Array
 
     @cached_property
-    def path(self) -> Path:
+    def path(self) -> RunPath:
         """Run to differentiate."""
         return self.make()
 

@@ -41,7 +41,7 @@ class JammedError(ValueError):
 
 @final
 @dataclass(frozen=True, eq=False)
-class Equations:
+class AlgebraicEquations:
     """Algebraic equations of a system, for a worker process that does not have the system.
 
     Attributes:
@@ -82,7 +82,11 @@ def first_guess(system: System, model: Model, x: Array, t: float = 0.0) -> Array
 
 
 def consistent(
-    system: System | Equations, where: str, y: Array, d: Array, follow: Follow | None = None
+    system: System | AlgebraicEquations,
+    where: str,
+    y: Array,
+    d: Array,
+    follow: Follow | None = None,
 ) -> Array:
     """Return `y` with consistent algebraic unknowns, by damped Newton from the given guess.
 
@@ -107,7 +111,7 @@ def consistent(
     return y
 
 
-def _searched(system: System | Equations, where: str, y: Array, d: Array) -> Array:
+def _searched(system: System | AlgebraicEquations, where: str, y: Array, d: Array) -> Array:
     """Return `y` with consistent algebraic unknowns, by Newton, then by Levenberg-Marquardt."""
     manifold = system.manifold
     try:
@@ -120,7 +124,7 @@ def _searched(system: System | Equations, where: str, y: Array, d: Array) -> Arr
     return y if settled else _solved(system, where, y, d)
 
 
-def _solved(system: System | Equations, where: str, y: Array, d: Array) -> Array:
+def _solved(system: System | AlgebraicEquations, where: str, y: Array, d: Array) -> Array:
     """Return `y` with consistent algebraic unknowns, by damped Newton."""
     rows, along = _moved(system)
     if not rows.size:
@@ -162,7 +166,7 @@ def _newton_steps(g: Array, J: Array) -> Array:
         return np.full(g.shape, np.nan)
 
 
-def _descended(system: System | Equations, y: Array, d: Array) -> Array:
+def _descended(system: System | AlgebraicEquations, y: Array, d: Array) -> Array:
     """Return `y` with a smaller residual of the algebraic equations, by Levenberg-Marquardt.
 
     When contacts start to stick, their loads change abruptly and by much. Damped Newton stalls at
@@ -187,17 +191,17 @@ def _descended(system: System | Equations, y: Array, d: Array) -> Array:
     return y
 
 
-def _moved(system: System | Equations) -> tuple[NDArray[np.intp], Array]:
+def _moved(system: System | AlgebraicEquations) -> tuple[NDArray[np.intp], Array]:
     """Return the unknowns that the algebraic equations determine, and their rows of `free`."""
     rows = np.flatnonzero(system.free.any(axis=1))
     return rows, system.free[rows]
 
 
-def _residual(system: System | Equations, y: Array, d: Array) -> float:
+def _residual(system: System | AlgebraicEquations, y: Array, d: Array) -> float:
     return float(np.linalg.norm(evaluate(system.constraints, y, d)))
 
 
-def _rounding(system: System | Equations, y: Array, d: Array) -> float:
+def _rounding(system: System | AlgebraicEquations, y: Array, d: Array) -> float:
     """Return the change of the residual when the last digits of `y` and `d` change."""
     here, rng = evaluate(system.constraints, y, d), np.random.default_rng(0)
     found: list[float] = []
@@ -209,7 +213,7 @@ def _rounding(system: System | Equations, y: Array, d: Array) -> float:
 
 
 def consistent_many(
-    system: System | Equations, together: Columns, where: str, y: Array, d: Array
+    system: System | AlgebraicEquations, together: Columns, where: str, y: Array, d: Array
 ) -> tuple[Array, dict[int, str]]:
     """Return rows of `y` (members, n) with consistent algebraic unknowns, and member -> failure.
 
@@ -262,7 +266,7 @@ def _charted(manifold: Manifold, y: Array, d: Array) -> Array:
 
 
 def _assembled(
-    system: System | Equations, manifold: Manifold, where: str, y: Array, d: Array
+    system: System | AlgebraicEquations, manifold: Manifold, where: str, y: Array, d: Array
 ) -> Array:
     """Return `y` with positions and velocities projected onto the constraints of a mechanism.
 

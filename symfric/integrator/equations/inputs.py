@@ -201,7 +201,7 @@ def _undriven(t_start: float, t_end: float) -> InputData:
     return InputData(NO_ROWS, NO_ROWS, np.array([t_start, t_end]), np.zeros((0, 1)), ())
 
 
-class _Part(NamedTuple):
+class _InputPart(NamedTuple):
     """Expression and data of one input.
 
     Attributes:
@@ -219,7 +219,7 @@ class _Part(NamedTuple):
     pieces: Pieces = Pieces()
 
 
-def _part(model: Model, variable: Variable, signal: Any, breaks: Array, begin: ca.SX) -> _Part:
+def _part(model: Model, variable: Variable, signal: Any, breaks: Array, begin: ca.SX) -> _InputPart:
     """Return expression and data of the input `variable`; `begin` is the start of an interval."""
     where, name = f"input '{variable.name}'", variable.name
     held = ca.SX.sym(f"{name}_k")
@@ -231,13 +231,13 @@ def _part(model: Model, variable: Variable, signal: Any, breaks: Array, begin: c
             )
         value, rise = signal.coefficients(breaks)
         if not rise.any():
-            return _Part("hold", held, (held,), (value,))
+            return _InputPart("hold", held, (held,), (value,))
         slope = ca.SX.sym(f"{name}_dot")
-        return _Part(RAMP, held + slope * (model.t - begin), (held, slope), (value, rise))
+        return _InputPart(RAMP, held + slope * (model.t - begin), (held, slope), (value, rise))
     if not callable(signal):
         # numbers are data, so that a new value does not require a new integrator
         number = checks.number(where, signal, hint=KINDS)
-        return _Part("hold", held, (held,), (np.full(breaks.size - 1, number),))
+        return _InputPart("hold", held, (held,), (np.full(breaks.size - 1, number),))
     others = stacked(model.vector(letter) for letter in "xzp")
     expression = _evaluated(where, signal, model, ca.vertcat(model.t, others))
     of_time = ca.substitute(expression, others, ca.SX.zeros(others.numel()))
@@ -247,7 +247,7 @@ def _part(model: Model, variable: Variable, signal: Any, breaks: Array, begin: c
     key = sha256(ca.SX.serialize(made).encode()).hexdigest()
     values = tuple(np.full(breaks.size - 1, number) for number in numbers)
     found = pieces(ca.SX.serialize(of_time), float(breaks[0]), float(breaks[-1]))
-    return _Part(key, made, (data,), values, found)
+    return _InputPart(key, made, (data,), values, found)
 
 
 def _evaluated(where: str, signal: Callable[[ca.SX], Any], model: Model, known: ca.SX) -> ca.SX:

@@ -17,7 +17,7 @@ from symfric.foundation.status import Status
 from symfric.integrator.equations.initial import consistent_many, smallest_step
 from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.many.members import Program, Runner, Stretch, with_code
-from symfric.integrator.methods.attempt import Given, State
+from symfric.integrator.methods.attempt import Given, SRow
 from symfric.integrator.methods.method import Method
 from symfric.integrator.running.events import Stop
 from symfric.integrator.running.integrator import Integrator, built
@@ -165,7 +165,7 @@ class Job:
             here, follow = waiting.pop(first), first == BEFORE and assembly is not None
             first = max(first, 0)
             if assembly is not None and follow:
-                S[here, State.Y], closed = assembly(S[here, State.Y], _data(chunk, here, first, nx))
+                S[here, SRow.Y], closed = assembly(S[here, SRow.Y], _data(chunk, here, first, nx))
                 waiting |= {first: here[~closed]} if not closed.all() else {}
                 here = here[closed]
             else:
@@ -175,7 +175,7 @@ class Job:
             found, reason, unknowns = run(part, chunk.R[here], made, stretch)
             for k, widest in enumerate((np.fmin, np.fmax)):
                 reach[here, k] = widest(reach[here, k], unknowns[:, k, :nx])
-            S[here], attempts[here], t = part, made, part[:, State.T]
+            S[here], attempts[here], t = part, made, part[:, SRow.T]
             signals[np.ix_(here, inside)] = found
             for k in np.flatnonzero(np.isin(reason, list(WHY))).tolist():
                 why = WHY[Stop(int(reason[k]))].value
@@ -186,7 +186,7 @@ class Job:
             interval = np.searchsorted(self.breaks, t[stuck])
             for k in np.unique(interval).tolist():
                 waiting[k] = np.concatenate([waiting.get(k, here[:0]), here[stuck][interval == k]])
-        return Solved(signals, attempts, S[:, State.T].copy(), failed, reach)
+        return Solved(signals, attempts, S[:, SRow.T].copy(), failed, reach)
 
     def _consistent(
         self, chunk: Chunk, S: Array, members: Indices, interval: int, failed: dict[int, str]
@@ -196,8 +196,8 @@ class Job:
         if equations is None:
             return members
         d = _data(chunk, members, interval, self.program.nx)
-        S[members, State.Y], refused = consistent_many(
-            equations, self.program.constraints, self.program.where, S[members, State.Y], d
+        S[members, SRow.Y], refused = consistent_many(
+            equations, self.program.constraints, self.program.where, S[members, SRow.Y], d
         )
         failed |= {int(members[m]): message for m, message in refused.items()}
         return np.delete(members, list(refused))
@@ -285,7 +285,7 @@ class SingleJob:
         for m, end in enumerate(chunk.ends.tolist()):
             own = self._inputs(chunk.data[m % chunk.data.shape[0]], end)
             looks = times[times <= end] if times.size else chunk.ends[m : m + 1]
-            y0, p = chunk.S[m, State.Y].copy(), chunk.R[m, Given.d(nx)][: len(self.model.p)].copy()
+            y0, p = chunk.S[m, SRow.Y].copy(), chunk.R[m, Given.d(nx)][: len(self.model.p)].copy()
             try:
                 allowed = watchful(self.tolerances, integrator, own)
                 run, _ = integrate(integrator, own, y0, p, allowed, self.backend, None, looks)

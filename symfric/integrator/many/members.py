@@ -19,10 +19,10 @@ from symfric.foundation.packed import state_of
 from symfric.integrator.compiled.columns import Columns, densified
 from symfric.integrator.compiled.compiler import load
 from symfric.integrator.equations.blocks import Following
-from symfric.integrator.equations.initial import ASSEMBLED, FLOOR, ITERATIONS, Equations
+from symfric.integrator.equations.initial import ASSEMBLED, FLOOR, ITERATIONS, AlgebraicEquations
 from symfric.integrator.equations.manifold import Manifold
 from symfric.integrator.many.vectors import c_text, lanes_header, vector_source
-from symfric.integrator.methods.attempt import Given, State
+from symfric.integrator.methods.attempt import Given, SRow
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.plants import MEMBERS, Advance, Plants, Why, compiled, loaded
 
@@ -136,7 +136,7 @@ class CompiledMembers:
         """
         found = np.empty((S.shape[0], stretch.times.shape[1], self.signals))
         starts, reason = np.ascontiguousarray(S), np.zeros(S.shape[0], dtype=np.int64)
-        reach = np.stack([S[:, State.Y]] * 2, axis=1)
+        reach = np.stack([S[:, SRow.Y]] * 2, axis=1)
         given = {
             name: getattr(stretch, name) for name in ("breaks", "data", "ends", "h_min", "times")
         }
@@ -189,9 +189,9 @@ def loop_sizes(
     step: ca.Function, signals: ca.Function, follows: bool, follow: Following | None
 ) -> dict[str, object]:
     """Return the macros of a loop over members: sizes, and indices in S and R."""
-    n = step.numel_in(0) - State.MEMORY
+    n = step.numel_in(0) - SRow.MEMORY
     return {
-        "N": n, "MEMORY": State.MEMORY, "T": State.T, "H": State.H, "SIZE_R": step.numel_in(1),
+        "N": n, "MEMORY": SRow.MEMORY, "T": SRow.T, "H": SRow.H, "SIZE_R": step.numel_in(1),
         "T_END": Given.T_END, "N_D": signals.numel_in(2), "ROWS": step.numel_out(1) // n,
         "SIGNALS": signals.numel_out(0), "FLOOR": repr(FLOOR),
         "FOLLOWS": 0 if not follows else 1 if follow is None else 2,
@@ -266,7 +266,7 @@ class Program:
     where: str
     code: str
     n_signals: int
-    equations: Equations | None
+    equations: AlgebraicEquations | None
     nominal: Array
     follow: Following | None
 
@@ -286,7 +286,7 @@ class Program:
     @cached_property
     def constraints(self) -> Columns:
         """Algebraic equations, evaluated for many columns; only if there are some."""
-        return Columns(cast("Equations", self.equations).constraints)
+        return Columns(cast("AlgebraicEquations", self.equations).constraints)
 
     @cached_property
     def assembly(self) -> Assembly | None:
@@ -317,7 +317,7 @@ def follow_of(integrator: Integrator) -> Following | None:
 def with_code(integrator: Integrator, code: str) -> Program:
     """Return the program of an integrator, with its equations in C as `code`."""
     s = integrator.system
-    equations = Equations(s.names, s.nx, s.free, s.constraints, s.manifold)
+    equations = AlgebraicEquations(s.names, s.nx, s.free, s.constraints, s.manifold)
     return Program(
         where=f"simulate_many of '{integrator.model.name}'",
         code=code,

@@ -39,14 +39,14 @@ from symfric.integrator.equations.blocks import blocks, signs
 from symfric.integrator.equations.manifold import PULLING, SHOCK
 from symfric.integrator.equations.system import System
 from symfric.integrator.methods.method import Method, Trial, Trials
-from symfric.integrator.methods.tangent import Tangent
+from symfric.integrator.methods.tangent import TangentChart
 
 GROWTH_MEMORY = 2.5
 """Largest growth of the step size that the controller stores."""
 
 
 @final
-class State:
+class SRow:
     """Rows of S: time, step to try, last accepted step, its growth, 1 after a rejected attempt."""
 
     T, H, H_OLD, GROWTH_OLD, REJECTED = range(5)
@@ -56,7 +56,7 @@ class State:
     @staticmethod
     def at(t: float, h: float, y: ArrayLike) -> Array:
         """Return S at time `t` without history, with the step `h` to try; y has shape (..., n)."""
-        return _joined(State.fresh(t, h), np.asarray(y, dtype=float))
+        return _joined(SRow.fresh(t, h), np.asarray(y, dtype=float))
 
     @staticmethod
     def fresh(t: float, h: float) -> list[float]:
@@ -184,10 +184,10 @@ KAPPA = 0.1
 
 
 @lru_cache(maxsize=2)
-def tangent(system: System) -> Tangent | None:
+def tangent(system: System) -> TangentChart | None:
     """Return the tangent-space form of a mechanism that requests it; None for other systems."""
     manifold = system.manifold
-    return Tangent(system, manifold) if manifold is not None and manifold.charted else None
+    return TangentChart(system, manifold) if manifold is not None and manifold.charted else None
 
 
 def steps(system: System, method: Method) -> Trials:
@@ -299,11 +299,11 @@ def build_step(system: System, method: Method, kind: Any = ca.SX) -> ca.Function
             as calls, which compile faster if the blocks are large.
     """
     n, nx = system.n, system.nx
-    S = kind.sym("S", State.MEMORY + n)
+    S = kind.sym("S", SRow.MEMORY + n)
     R = kind.sym("R", Given.FIXED + nx + system.d.numel())
-    t, h_wish, h_old, growth_old, rejected = (S[i] for i in range(State.MEMORY))
+    t, h_wish, h_old, growth_old, rejected = (S[i] for i in range(SRow.MEMORY))
     t_end, rtol, h_max = (R[i] for i in range(Given.FIXED))
-    y, atol, d = S[State.Y], R[Given.atol(nx)], R[Given.d(nx)]
+    y, atol, d = S[SRow.Y], R[Given.atol(nx)], R[Given.d(nx)]
 
     left = t_end - t
     h = ca.fmax(ca.fmin(h_wish, left), 1e-300)

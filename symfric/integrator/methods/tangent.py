@@ -42,7 +42,7 @@ method of order 5 need order 5.
 
 
 @final
-class Tangent:
+class TangentChart:
     """Chart of a mechanism with y = (q, q', s, a, lam and normal forces, V, t).
 
     The unknowns in the chart are y_c = (w, w', other unknowns).

@@ -40,7 +40,7 @@ from symfric.foundation.variable import stacked, strays, symbols_of
 from symfric.integrator.compiled.columns import Columns
 from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.running.integrator import Integrator, remember
-from symfric.integrator.running.record import Run
+from symfric.integrator.running.record import RunRecord
 from symfric.model import Model
 from symfric.model.contact import APPLIED, Contact
 from symfric.model.forces import by_laws
@@ -61,7 +61,9 @@ LOOKS = 200
 """Maximum number of peaks checked in a run with a varying load."""
 
 
-def doubts(integrator: Integrator, inputs: InputData, run: Run, p: Array) -> list[UserWarning]:
+def doubts(
+    integrator: Integrator, inputs: InputData, run: RunRecord, p: Array
+) -> list[UserWarning]:
     """Return the warnings about a run that ended well; empty if there are none."""
     if not run.status.ok:
         return []
@@ -132,7 +134,7 @@ class Sliding:
 
 
 def _gains(
-    sliding: Sliding, integrator: Integrator, inputs: InputData, run: Run, p: Array
+    sliding: Sliding, integrator: Integrator, inputs: InputData, run: RunRecord, p: Array
 ) -> Iterator[str]:
     """Yield a message about a contact whose friction adds energy to the motion."""
     (t, y), contact = run.seen, sliding.contact
@@ -184,7 +186,7 @@ def _sliding(model: Model, contact: Contact) -> Sliding | None:
 
 @final
 @dataclass(frozen=True, eq=False)
-class Held:
+class CarriedForce:
     """Force carried by the states of a law in one contact, and its static level.
 
     Attributes:
@@ -220,7 +222,7 @@ class Held:
         force, level, _ = (rows.full() for rows in screen(z, p))
         return np.abs(force[0]) / np.where(level[0] > 0, level[0], np.inf)
 
-    def bound(self, run: Run, p: Array) -> float:
+    def bound(self, run: RunRecord, p: Array) -> float:
         """Return an upper bound of force over level in a run, from the extremes of each state."""
         if self.screen is None:
             return inf
@@ -236,7 +238,12 @@ class Held:
 
 
 def _overloads(
-    held: Held, most: float, integrator: Integrator, inputs: InputData, run: Run, p: Array
+    held: CarriedForce,
+    most: float,
+    integrator: Integrator,
+    inputs: InputData,
+    run: RunRecord,
+    p: Array,
 ) -> Iterator[str]:
     """Yield a message about a contact whose force exceeds its level, by `most` at most."""
     (t, y), fixed = run.seen, held.screen is not None
@@ -256,7 +263,7 @@ def _overloads(
         yield overload(held, most)
 
 
-def overload(held: Held, ratio: float, when: str = "") -> str:
+def overload(held: CarriedForce, ratio: float, when: str = "") -> str:
     """Return the message about friction that is `ratio` times its level."""
     law = type(held.contact.law).__name__
     return (
@@ -266,14 +273,14 @@ def overload(held: Held, ratio: float, when: str = "") -> str:
     )
 
 
-def places(model: Model) -> tuple[Held, ...]:
+def places(model: Model) -> tuple[CarriedForce, ...]:
     """Return the contacts of a model whose law sticks through its states."""
     if "held" not in model.memory:
         model.memory["held"] = tuple(h for c in model.contacts if (h := _held(model, c)))
     return model.memory["held"]
 
 
-def _held(model: Model, contact: Contact) -> Held | None:
+def _held(model: Model, contact: Contact) -> CarriedForce | None:
     """Return the force that the states of a contact carry; None if force or level are unknown."""
     if not contact.states or APPLIED in contact.given:
         return None
@@ -286,7 +293,9 @@ def _held(model: Model, contact: Contact) -> Held | None:
     if not strays(both, ca.vertcat(z, p)):
         screen = ca.Function("held", [z, p], [force, level, ca.jacobian(force, z)])
     own = [v.name for v in contact.states]
-    return Held(contact, [i for i, v in enumerate(model.x) if v.name in own], force, level, screen)
+    return CarriedForce(
+        contact, [i for i, v in enumerate(model.x) if v.name in own], force, level, screen
+    )
 
 
 def _peaks(z: Array) -> NDArray[np.intp]:

@@ -22,7 +22,7 @@ from symfric.integrator.compiled.columns import filled
 from symfric.integrator.compiled.compiler import load
 from symfric.integrator.equations.blocks import Following
 from symfric.integrator.equations.initial import FLOOR, SURE
-from symfric.integrator.methods.attempt import GROWTH_MEMORY, Given, State
+from symfric.integrator.methods.attempt import GROWTH_MEMORY, Given, SRow
 from symfric.integrator.running import crossings as limits
 from symfric.integrator.running.contact_modes import TURNING, ContactModes
 from symfric.integrator.running.crossings import LOOKS, Crossings
@@ -40,7 +40,7 @@ BATCH, FEW = 32, 8
 """Attempts per call of the virtual machine, in general and on intervals that need only a few."""
 
 
-class Loop(ctypes.Structure):
+class LoopStruct(ctypes.Structure):
     """Struct `symfric_loop` of the C code, field by field."""
 
     _fields_ = (
@@ -78,9 +78,9 @@ class Work:
         self.n, width = n, Record(n, dense_rows).width
         if rows is None:
             rows = max(LEAST_ROWS, min(MOST_ROWS, BYTES // (8 * width)))
-        self.S, self.R = np.zeros(State.MEMORY + n), np.zeros(given)
+        self.S, self.R = np.zeros(SRow.MEMORY + n), np.zeros(given)
         self.rows, self.reach = np.empty((rows, width)), np.zeros((2, n))
-        self.loop = Loop(
+        self.loop = LoopStruct(
             S=self.S.ctypes.data, R=self.R.ctypes.data, rows=self.rows.ctypes.data, max_rows=rows,
             reach=self.reach.ctypes.data,
         )  # fmt: skip
@@ -93,8 +93,8 @@ class Work:
 
     def begin(self, t: float, h: float, y: Array) -> None:
         """Start at time `t` [s] from the unknowns `y` with the step `h` [s]."""
-        self.S[: State.MEMORY] = State.fresh(t, h)
-        self.S[State.Y] = self.reach[:] = y
+        self.S[: SRow.MEMORY] = SRow.fresh(t, h)
+        self.S[SRow.Y] = self.reach[:] = y
 
     def over(self, breaks: Array, data: Array) -> None:
         """Set the input intervals: `breaks` (k + 1,) and the `data` (n_data, k) on each of them."""
@@ -156,27 +156,27 @@ class VmEngine:
         S, R, events, h_min = work.S, work.R, work.events, work.loop.h_min
         S_out, D, t_end = batch.S_out, batch.D, R[Given.T_END]
         batch.R[:] = R
-        surely = max(h_min, FLOOR * max(abs(t_end), abs(S[State.T])))
+        surely = max(h_min, FLOOR * max(abs(t_end), abs(S[SRow.T])))
         found, count, made, request = list[Array](), 0, 0, None
-        while S[State.T] < t_end and count < rows and made < attempts and _large(S, h_min).all():
+        while S[SRow.T] < t_end and count < rows and made < attempts and _large(S, h_min).all():
             if request or (events is not None and events.full):
                 break
             batch.S[:] = S
             batch.call()
             before = np.vstack([S, S_out[:-1]])
-            took = S_out[:, State.T] > before[:, State.T]
+            took = S_out[:, SRow.T] > before[:, SRow.T]
             used = size
             if not (
-                S_out[-1, State.T] < t_end
-                and S_out[:, State.H].min() >= surely
+                S_out[-1, SRow.T] < t_end
+                and S_out[:, SRow.H].min() >= surely
                 and size <= min(rows - count, attempts - made)
             ):  # discard attempts of the batch that the compiled loop would not make
                 fits = np.cumsum(took) - took < rows - count
-                goes = (before[:, State.T] < t_end) & _large(before, h_min) & fits
+                goes = (before[:, SRow.T] < t_end) & _large(before, h_min) & fits
                 used = min(size if goes.all() else int(np.argmin(goes)), attempts - made)
                 took[used:] = False
-            times = before[took, State.T, None], S_out[took, State.T, None]
-            found.append(np.hstack([*times, before[took, State.Y], S_out[took, State.Y], D[took]]))
+            times = before[took, SRow.T, None], S_out[took, SRow.T, None]
+            found.append(np.hstack([*times, before[took, SRow.Y], S_out[took, SRow.Y], D[took]]))
             if events is not None:
                 found[-1], used, request = _searched(events.search, found[-1], S_out, took, used, R)
             count += found[-1].shape[0]
@@ -186,7 +186,7 @@ class VmEngine:
         records = np.vstack([work.rows[:0], *found]) if len(found) != 1 else found[0]
         if request is None:
             request = Stop.ATTEMPTS
-            if S[State.T] >= t_end:
+            if S[SRow.T] >= t_end:
                 request = Stop.END
             elif not _large(S, h_min).all():
                 request = Stop.STEP_TOO_SMALL
@@ -249,7 +249,7 @@ def _searched(
 
 def _large(S: Array, h_min: float) -> NDArray[np.bool_]:
     """Return a mask of the columns S (..., MEMORY + n) with long enough steps; False for NaN."""
-    return S[..., State.H] >= np.maximum(h_min, FLOOR * np.abs(S[..., State.T]))
+    return S[..., SRow.H] >= np.maximum(h_min, FLOOR * np.abs(S[..., SRow.T]))
 
 
 @final
@@ -296,10 +296,10 @@ def c_source(
     called = (step, *(crossings.functions if crossings else ()))
     for function in (*called, *others):
         generator.add(function)
-    n, given = step.numel_in(0) - State.MEMORY, step.numel_in(1)
+    n, given = step.numel_in(0) - SRow.MEMORY, step.numel_in(1)
     attempts = filled(
         FOLDER / "attempts.c", *called,
-        n=n, memory=State.MEMORY, t=State.T, h=State.H, t_end=Given.T_END, given=given,
+        n=n, memory=SRow.MEMORY, t=SRow.T, h=SRow.H, t_end=Given.T_END, given=given,
         width=Record(n, dense_rows).width, dense=2 + 2 * n, dense_rows=dense_rows, floor=FLOOR,
         jump=crossings.width if crossings else 0, searches=int(crossings is not None),
     )  # fmt: skip
@@ -366,7 +366,7 @@ def search_source(crossings: Crossings, given: int, *, decides: bool = True) -> 
         looks=len(LOOKS) - 1, at_looks=", ".join(map(repr, LOOKS)), kept=limits.KEPT,
         alike=limits.ALIKE, finer=limits.FINER, sharper=limits.SHARPER, soon=limits.SOON,
         straight=limits.STRAIGHT, restart=limits.RESTART, least=limits.LEAST, sure=SURE,
-        growth=GROWTH_MEMORY, memory=State.MEMORY, d=given - crossings.data, h_max=Given.H_MAX,
+        growth=GROWTH_MEMORY, memory=SRow.MEMORY, d=given - crossings.data, h_max=Given.H_MAX,
     )  # fmt: skip
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from symfric.foundation.numeric import Array, Buffered, bound
 from symfric.integrator.equations.initial import SURE
-from symfric.integrator.methods.attempt import Given, State
+from symfric.integrator.methods.attempt import Given, SRow
 from symfric.integrator.running import crossings as limits
 from symfric.integrator.running.crossings import (
     AT_ONCE,
@@ -184,9 +184,9 @@ class Search:
             self.eventful.steps += 1
             h = min(float(self.memory[Memory.RESUME]), float(R[Given.H_MAX]))
             self.memory[Memory.RESUME] = 0.0
-            if S[State.H] >= h:
+            if S[SRow.H] >= h:
                 return Change.NOTHING, None
-            S[State.H] = h
+            S[SRow.H] = h
             return Change.RESUMED, None
         theta, which = found
         h = float(row[Record.T1] - row[Record.T0])
@@ -211,7 +211,7 @@ class Search:
         again = max(
             min(h, limits.RESTART * self.eventful.tolerance), limits.LEAST * h, SURE * abs(t)
         )
-        S[:] = State.at(t, again, after)
+        S[:] = SRow.at(t, again, after)
         return (Change.CUT if kept else Change.DROPPED), self._request(t, which)
 
     def _request(self, t: float, which: NDArray[np.bool_]) -> Stop | None:

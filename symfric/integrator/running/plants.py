@@ -18,7 +18,7 @@ from symfric.foundation.numeric import Array, bound, evaluate
 from symfric.integrator.compiled.columns import densified, filled
 from symfric.integrator.compiled.compiler import load
 from symfric.integrator.equations.initial import FLOOR, first_step
-from symfric.integrator.methods.attempt import Given, State
+from symfric.integrator.methods.attempt import Given, SRow
 from symfric.integrator.running.engine import FOLDER, Engine, Work, c_source
 from symfric.integrator.running.events import Eventful, Stop
 from symfric.integrator.running.integrator import Integrator
@@ -222,12 +222,12 @@ class InPython:
     def _takes_over(self, b: int) -> bool:
         """Take over inputs and the next sample time; return False if unknowns could not follow."""
         plants, S, R, ready = self.plants, self.work.S, self.work.R, bool(self.plants.ready[b])
-        plants.count[b] += S[State.T] >= R[Given.T_END]
+        plants.count[b] += S[SRow.T] >= R[Given.T_END]
         plants.made[b] = plants.ready[b] = 0
         R[Given.T_END] = plants.begin[b] + plants.count[b] * plants.dt
         R[R.size - plants.u.shape[1] :] = plants.u[b]
         if self.events is not None and ready:
-            t, y, d = S[State.T : State.T + 1], S[State.Y], R[self.data]
+            t, y, d = S[SRow.T : SRow.T + 1], S[SRow.Y], R[self.data]
             values = evaluate(self.integrator.events, t, y, d)
             self.events.started(self.integrator.model.events, values)
         elif self.events is not None:
@@ -236,7 +236,7 @@ class InPython:
 
     def _follow(self) -> bool:
         """Update algebraic unknowns after a jump; return False if that fails."""
-        follow, y = self.integrator.follow, self.work.S[State.Y]
+        follow, y = self.integrator.follow, self.work.S[SRow.Y]
         found = y if follow is None else follow(y, self.work.R[self.data])
         if found is not None:
             y[:] = found
@@ -248,12 +248,12 @@ class InPython:
         if self.events is not None:
             return self._runs_with(self.events, b)
         made = 0
-        while S[State.T] < end and made < plants.attempts and _large(S, plants.h_min):
+        while S[SRow.T] < end and made < plants.attempts and _large(S, plants.h_min):
             self.attempt()
             S[:] = self.after
             made += 1
         plants.made[b] += made
-        if S[State.T] >= end:
+        if S[SRow.T] >= end:
             return Why.END
         return Why.ATTEMPTS if _large(S, plants.h_min) else Why.STEP_TOO_SMALL
 
@@ -277,16 +277,16 @@ class InPython:
                     return Why.SEARCH
             if stop is Stop.DECIDE:
                 S, d = self.work.S, self.work.R[Given.d(self.integrator.system.nx)].copy()
-                t, before = float(S[State.T]), jumps.before[-1].copy()
-                S[State.Y] = self.integrator.decided(t, before, S[State.Y].copy(), d)
+                t, before = float(S[SRow.T]), jumps.before[-1].copy()
+                S[SRow.Y] = self.integrator.decided(t, before, S[SRow.Y].copy(), d)
                 events.decided()
         return Why.ATTEMPTS
 
 
 def _large(S: Array, h_min: float) -> bool:
     """Return True if the step is long enough to continue; False for NaN."""
-    h = S[State.H]
-    return bool(h >= h_min and h >= FLOOR * abs(S[State.T]))
+    h = S[SRow.H]
+    return bool(h >= h_min and h >= FLOOR * abs(S[SRow.T]))
 
 
 EVENTFUL_ATTEMPTS = 50_000
@@ -301,9 +301,9 @@ def looking(integrator: Integrator, plants: Plants, backend: str) -> Callable[[]
     """Return a function for the signals of all plants at their times, shape (plants, signals)."""
     S, d = plants.S, plants.R[:, Given.d(integrator.system.nx)]
     if len(S) > 1:
-        rows = [S[:, State.T], S[:, State.Y], d]
+        rows = [S[:, SRow.T], S[:, SRow.Y], d]
         return lambda: integrator.signal_columns(rows, backend=backend)[0]
-    function, arguments = densified(integrator.signals), (S[0, : State.T + 1], S[0, State.Y], d[0])
+    function, arguments = densified(integrator.signals), (S[0, : SRow.T + 1], S[0, SRow.Y], d[0])
     values = np.zeros((1, function.numel_out(0)))
     call = bound(function, arguments, [values])
 

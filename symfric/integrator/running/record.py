@@ -212,7 +212,7 @@ class Extent(NamedTuple):
 
 @final
 @dataclass(eq=False)
-class Run:
+class RunRecord:
     """Record of a run; mutable, and available after interrupts and failures.
 
     Attributes:
@@ -240,7 +240,7 @@ class Run:
     steps: int = 0
     attempts: int = 0
     engine: str = ""
-    again: Callable[[Array, float], "Run"] | None = None
+    again: Callable[[Array, float], "RunRecord"] | None = None
     status: Status = Status.SUCCESS
     message: str = Status.SUCCESS.value
     most: float = MOST_BYTES

@@ -19,11 +19,11 @@ from symfric.foundation.status import Status
 from symfric.integrator.equations.expressions import pieces
 from symfric.integrator.equations.initial import JammedError, consistent, first_step, smallest_step
 from symfric.integrator.equations.inputs import InputData
-from symfric.integrator.methods.attempt import Given, State
+from symfric.integrator.methods.attempt import Given, SRow
 from symfric.integrator.running.diagnosis import chattering, explain
 from symfric.integrator.running.events import Stop
 from symfric.integrator.running.integrator import Integrator
-from symfric.integrator.running.record import MOST_BYTES, Outputs, Run
+from symfric.integrator.running.record import MOST_BYTES, Outputs, RunRecord
 
 SMALL, REST = 1e-3, 1e-12
 """Sizes, in nominal values, below which a motion gets its own scale, or counts as zero.
@@ -105,7 +105,7 @@ def integrate(
     backend: str,
     progress: Callable[[float], None] | None,
     times: Array = NOWHERE,
-) -> tuple[Run, Integrator]:
+) -> tuple[RunRecord, Integrator]:
     """Integrate over all input intervals, with outputs at `times`.
 
     A motion that turns out to be tiny is integrated again on its own scale.
@@ -134,7 +134,7 @@ def integrate(
     return run, march.integrator
 
 
-def _ends_small(run: Run, integrator: Integrator) -> bool:
+def _ends_small(run: RunRecord, integrator: Integrator) -> bool:
     """Return True if a state is small at the end, as few are, in a form that is fast for few."""
     sizes = integrator.memory.get("small")
     if sizes is None:
@@ -175,7 +175,7 @@ class _March:
     times: Array
     most: float
 
-    def run(self) -> Run:
+    def run(self) -> RunRecord:
         """Run once over all input intervals; keep steps of up to `most` bytes."""
         integrator, allowed, inputs = self.integrator, self.tolerances, self.inputs
         (t_start, t_end), d = inputs.span, self.p
@@ -192,7 +192,7 @@ class _March:
         outputs = Outputs.at(self.times, y.size)
         work.want(outputs)
         work.over(inputs.breaks, inputs.values)
-        run = self.made = Run(t_start, y, outputs, most=self.most)
+        run = self.made = RunRecord(t_start, y, outputs, most=self.most)
         self.places, self.limit, self.limit_set_at = [y], allowed.max_steps, t_start
         try:
             self._march(t_start, t_end)
@@ -212,12 +212,12 @@ class _March:
     @property
     def t(self) -> float:
         """Current time [s]."""
-        return float(self.work.S[State.T])
+        return float(self.work.S[SRow.T])
 
     @property
     def y(self) -> Array:
         """Unknowns, as a view of S."""
-        return self.work.S[State.Y]
+        return self.work.S[SRow.Y]
 
     @property
     def d(self) -> Array:
@@ -228,7 +228,7 @@ class _March:
         """Integrate over all input intervals."""
         run, model = self.made, self.integrator.model
         if self.events is not None:
-            t, d = self.work.S[State.T], self.work.R[Given.d(self.integrator.system.nx)]
+            t, d = self.work.S[SRow.T], self.work.R[Given.d(self.integrator.system.nx)]
             self.events.started(model.events, self.integrator.events_at(t, self.y, d)[0])
         left, reason = 0.0, Stop.FULL
         while reason is not Stop.END and run.status is Status.SUCCESS:
@@ -288,15 +288,15 @@ class _March:
             return False
         self.integrator = other
         self.places.append(here)
-        h = max(float(self.work.S[State.H]), first_step(span, self.t))
-        self.work.S[:] = State.at(self.t, h, here)
+        h = max(float(self.work.S[SRow.H]), first_step(span, self.t))
+        self.work.S[:] = SRow.at(self.t, h, here)
         return True
 
     def _act(self, reason: Stop) -> None:
         """Handle the `reason` for which an engine returned."""
         run, events = self.made, self.integrator.model.events
         if reason is Stop.STEP_TOO_SMALL:
-            h = self.work.S[State.H]
+            h = self.work.S[SRow.H]
             run.stop(*explain(self.integrator, self.t, self.y, self.d, h))
         elif reason is Stop.TERMINAL:
             run.stop(Status.TERMINATED)

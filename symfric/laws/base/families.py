@@ -53,7 +53,7 @@ class TwoLevels(Levels):
 
 
 @parametric
-class Curve(StaticLaw):
+class CurveLaw(StaticLaw):
     """Law without states with one formula for both directions s of slip.
 
         F = formula(v, N, s, fall)

@@ -16,7 +16,7 @@ from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar, empty, equals, is_casadi, is_number, is_symbolic
 from symfric.foundation.parameters import Parametric, parameters, parametric
 from symfric.foundation.symbolic import plain
-from symfric.foundation.vector import Rows
+from symfric.foundation.vector import VectorRows
 from symfric.laws.base import smooth
 from symfric.laws.base.phenomena import CONFIDENCE
 
@@ -376,7 +376,7 @@ def states_of(law: Law, v: Scalar, z: Scalar) -> Scalar:
     given = z
     if is_casadi(z):
         rows = z.shape[0] if z.numel() else 0  # a slice of a scalar has shape (1, 0)
-    elif isinstance(z, Rows):
+    elif isinstance(z, VectorRows):
         return z
     elif is_number(z):
         z, rows = np.array([z], float), 1

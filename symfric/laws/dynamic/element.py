@@ -165,7 +165,7 @@ def spent(f: Callable[[Scalar], Scalar], v: Vectors, t: Vectors, r: Vectors) -> 
 
 @final
 @dataclass(frozen=True, eq=False)
-class Held:
+class ConstantStep:
     """Step of h [s] at constant velocity and load, which is common to all elements of a law.
 
         way = v h,   s = sign(v)
@@ -181,7 +181,7 @@ class Held:
     some: Scalar
 
     @classmethod
-    def over(cls, v: Scalar, h: Scalar) -> "Held":
+    def over(cls, v: Scalar, h: Scalar) -> "ConstantStep":
         """Return a step of `h` [s] at the velocity `v`."""
         way, still = v * h, v == 0
         return cls(way, smooth.sign(v, 0.0), still, smooth.choose(still, h, way))

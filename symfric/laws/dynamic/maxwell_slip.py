@@ -5,8 +5,8 @@ from symfric.foundation.parameters import Parametric, option, parametric
 from symfric.laws.base import fields, smooth
 from symfric.laws.base.law import Facts, State, Switch
 from symfric.laws.dynamic.element import (
+    ConstantStep,
     Elements,
-    Held,
     StribeckLevel,
     ahead,
     held_columns,
@@ -112,7 +112,7 @@ class MaxwellSlip(Elements):
         """Return the exact step in the event form, and None in the smooth form."""
         if self.form == "smooth":
             return None
-        count, held = len(self.elements), Held.over(v, h)
+        count, held = len(self.elements), ConstantStep.over(v, h)
         return held_columns(
             held.yielded(z[i], z[count + i], e.k, e.mu * N) for i, e in enumerate(self.elements)
         )
@@ -321,7 +321,7 @@ class GMS(StribeckLevel, Elements):
         """
         if self.form == "smooth":
             return None
-        count, g, held = len(self.elements), self.level(v, N), Held.over(v, h)
+        count, g, held = len(self.elements), self.level(v, N), ConstantStep.over(v, h)
         x = -self.C * h / g
         left, left_in_mean = 1 + expm1(x), smooth.phi1(x)
         share = g / total(e.alpha for e in self.elements)

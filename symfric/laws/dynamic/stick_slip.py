@@ -7,7 +7,7 @@ from symfric.foundation.parameters import option, parametric
 from symfric.laws.base import fields, smooth
 from symfric.laws.base.families import Levels, Sticking, TwoLevels, carried
 from symfric.laws.base.law import Facts, State, Switch
-from symfric.laws.dynamic.element import Held, deflection, yielding
+from symfric.laws.dynamic.element import ConstantStep, deflection, yielding
 
 
 @parametric
@@ -224,7 +224,7 @@ class HaessigFriedland(TwoLevels):
         """
         if self.form == "smooth":
             return None
-        held = Held.over(v, h)
+        held = ConstantStep.over(v, h)
         end, mean, slip = held.yielded(z[0], z[1], 1.0, self.mu_d * N / self.sigma_0)
         return column(end, slip), column(mean, slip)
 

@@ -3,12 +3,12 @@
 from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import parametric
 from symfric.laws.base import fields
-from symfric.laws.base.families import Curve, Fall, Levels
+from symfric.laws.base.families import CurveLaw, Fall, Levels
 from symfric.laws.base.law import Facts
 
 
 @parametric
-class Stribeck(Levels, Curve):
+class Stribeck(Levels, CurveLaw):
     """Stribeck friction with exponent delta (Bo-Pavelescu), smooth at rest.
 
         F = N [mu_d + (mu_s - mu_d) exp(-|v/v_s|^delta)] tanh(v / v_eps) + sigma_2 v
@@ -36,7 +36,7 @@ class Stribeck(Levels, Curve):
 
 
 @parametric
-class Tustin(Levels, Curve):
+class Tustin(Levels, CurveLaw):
     """Tustin friction: Coulomb and viscous friction with an exponential fall.
 
         F = N [mu_d + (mu_s - mu_d) exp(-|v|/v_s)] sign(v) + sigma_2 v
@@ -60,7 +60,7 @@ class Tustin(Levels, Curve):
 
 
 @parametric
-class Benson(Levels, Curve):
+class Benson(Levels, CurveLaw):
     """Benson-Hallquist exponential friction of finite-element codes.
 
         F = N [mu_d + (mu_s - mu_d) exp(-d_c |v|)] sign(v)
@@ -82,7 +82,7 @@ class Benson(Levels, Curve):
 
 
 @parametric
-class Berger(Levels, Curve):
+class Berger(Levels, CurveLaw):
     """Berger friction, an interpretation: an exponential fall with a smooth sign.
 
         F = N [mu_d + (mu_s - mu_d) exp(-|v|/v_s)] tanh(v / v_t)
@@ -105,7 +105,7 @@ class Berger(Levels, Curve):
 
 
 @parametric
-class DuanSingh(Levels, Curve):
+class DuanSingh(Levels, CurveLaw):
     """Duan-Singh friction: smoothed dry friction with a ratio of static to kinetic friction.
 
         F = mu_d N [1 + (mu_s/mu_d - 1) exp(-c |v|)] tanh(sigma v)
@@ -128,7 +128,7 @@ class DuanSingh(Levels, Curve):
 
 
 @parametric
-class Andersson(Levels, Curve):
+class Andersson(Levels, CurveLaw):
     """Andersson-Soderberg-Bjorklund friction.
 
         F = N [mu_d + (mu_s - mu_d) exp(-(|v|/v_s)^p)] tanh(k_t v) + sigma_2 v
@@ -153,7 +153,7 @@ class Andersson(Levels, Curve):
 
 
 @parametric
-class SteadyStateLuGre(Curve):
+class SteadyStateLuGre(CurveLaw):
     """Steady-state LuGre friction with exponent delta, in newton.
 
         F = [F_C + (F_S - F_C) exp(-|v/v_s|^delta)] sign(v) + sigma_2 v

@@ -9,11 +9,11 @@ from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar, log, tanh, total
 from symfric.foundation.parameters import Parametric, option, param, parameters, parametric
 from symfric.laws.base import fields, smooth
-from symfric.laws.base.families import Curve, Fall
+from symfric.laws.base.families import CurveLaw, Fall
 from symfric.laws.base.law import Facts
 
 
-class FromData(Curve):
+class FromData(CurveLaw):
     """Law with the force N mu(v) in the direction of sliding."""
 
     @abstractmethod

@@ -17,12 +17,12 @@ from symfric.foundation.numeric import (
 )
 from symfric.foundation.parameters import option, param, parametric
 from symfric.laws.base import fields, smooth
-from symfric.laws.base.families import Curve, Fall
+from symfric.laws.base.families import CurveLaw, Fall
 from symfric.laws.base.law import Facts, Input, StaticLaw, one_sided
 
 
 @parametric
-class Bittencourt(Curve):
+class Bittencourt(CurveLaw):
     """Friction torque of a robot joint at load N and temperature T, after Bittencourt.
 
         static(T)  = max(F_s0 + F_sT T, 0),   v_s(T) = v_s0 + v_sT T
@@ -339,7 +339,7 @@ class QuarterCarGeneral(StaticLaw):
 
 
 @parametric
-class QuarterCarSimple(Curve):
+class QuarterCarSimple(CurveLaw):
     """Quarter-car friction without the Coulomb term, in newton.
 
         F = C_e exp(-|v|/e_1) sign(v) + sigma_v v

@@ -5,7 +5,7 @@ from math import e, sqrt
 from symfric.foundation.numeric import Scalar, equals, exp, tanh
 from symfric.foundation.parameters import param, parametric
 from symfric.laws.base import fields, smooth
-from symfric.laws.base.families import Curve, Fall, Levels, TwoLevels
+from symfric.laws.base.families import CurveLaw, Fall, Levels, TwoLevels
 from symfric.laws.base.law import Facts, StaticLaw
 
 
@@ -154,7 +154,7 @@ class MakkarDixon(StaticLaw):
 
 
 @parametric
-class Lorentzian(Levels, Curve):
+class Lorentzian(Levels, CurveLaw):
     """Lorentzian friction of Hess and Soom.
 
         F = N [mu_d + (mu_s - mu_d) / (1 + (v/v_s)^2)] sign(v) + sigma_2 v
@@ -216,7 +216,7 @@ class PoppStelter(StaticLaw):
 
 
 @parametric
-class MixedLubrication(Curve):
+class MixedLubrication(CurveLaw):
     """Stribeck curve over the Hersey number: boundary, mixed and hydrodynamic friction.
 
         p  = N / A,   H = eta |v| / p

@@ -12,7 +12,7 @@ from identification.data.dataset import Dataset
 from identification.residuals import stepper
 from identification.residuals.shooting import Shooting
 from identification.residuals.shots import means, sampled_motion
-from identification.residuals.stepper import Motion
+from identification.residuals.stepper import SteppedMotion
 from identification.unknowns.subject import Subject, subject
 from symfric.foundation.parameters import Variable
 from symfric.foundation.programs import find_compiler
@@ -89,7 +89,7 @@ def test_slopes_are_those_of_finite_differences_through_stick() -> None:
     model, p = stick_slip()
     at = np.array([*p, 0.01, 0.2])
 
-    def moved(at: np.ndarray) -> Motion:
+    def moved(at: np.ndarray) -> SteppedMotion:
         return run(model, FORCE, at[:-2].tolist(), at[-2:].tolist())
 
     base = moved(at)

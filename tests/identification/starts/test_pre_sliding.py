@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from identification.starts.experiments import break_away
-from identification.starts.maxwell_slip import Elements, _merged, fit_elements, stretches
+from identification.starts.maxwell_slip import SlipElements, _merged, fit_elements, stretches
 from identification.starts.measured import Measured, hysteresis, turning_points
 
 T = 0.015 * np.arange(1000)
@@ -50,7 +50,7 @@ def test_elements_are_found_with_their_radii(noise: float) -> None:
 
 def test_merged_neighbours_keep_their_stiffness_and_their_level() -> None:
     k, radii = np.array([9e5, 8e4, 8e4, 1e4]), np.array([3e-7, 2.9e-6, 3.1e-6, 9e-6])
-    merged = _merged(Elements(k, radii, 0.0, 0.0, 0, 0.0), 3)
+    merged = _merged(SlipElements(k, radii, 0.0, 0.0, 0, 0.0), 3)
     np.testing.assert_allclose(merged, [3e-7, 3e-6, 9e-6])
 
 

@@ -14,7 +14,7 @@ from ocp.friction import sequence
 from ocp.friction.arc_solution import ModeSolver, SolvedSequence
 from ocp.friction.arcs import STOPPED, Rules, in_arcs
 from ocp.friction.mode_optimisation import KICK, SHORTEST, better, settled
-from ocp.friction.sequence import Leg, Run, Track
+from ocp.friction.sequence import Leg, ModeInterval, Track
 from ocp.friction.smooth_models import smoothed, widths
 from ocp.friction.transfer import Known, Reader
 from ocp.problems import cart_pendulum, load_through_spring, out_and_back
@@ -32,7 +32,9 @@ def there_and_back() -> Track:
 def one(*runs: tuple[int, float, float]) -> tuple[Leg]:
     """One leg of 1 s of the contact "guide"."""
     return (
-        sequence.cut([Track("guide", tuple(Run(*run) for run in runs))], (0, 0), 0.0, runs[-1][2]),
+        sequence.cut(
+            [Track("guide", tuple(ModeInterval(*run) for run in runs))], (0, 0), 0.0, runs[-1][2]
+        ),
     )
 
 
@@ -41,7 +43,7 @@ SPRING = Rules(load_through_spring(), {"load": 6.0}, (), 1e-4)
 
 def two(*runs: tuple[int, float, float], contact: str = "guide") -> tuple[Leg, Leg]:
     """Two legs of 1 s of a contact."""
-    track = Track(contact, tuple(Run(*run) for run in runs))
+    track = Track(contact, tuple(ModeInterval(*run) for run in runs))
     return sequence.cut([track], (0, 0), 0.0, 1.0), sequence.cut([track], (1, 0), 1.0, 2.0)
 
 
@@ -68,8 +70,8 @@ def test_rests_are_inserted_at_reversals_and_ends_that_can_hold() -> None:
 
 
 def test_legs_are_cut_where_any_contact_changes() -> None:
-    first = Track("one", (Run(1, 0.0, 1.2), Run(-1, 1.2, 2.0)))
-    second = Track("two", (Run(0, 0.0, 0.5), Run(1, 0.5, 2.0)))
+    first = Track("one", (ModeInterval(1, 0.0, 1.2), ModeInterval(-1, 1.2, 2.0)))
+    second = Track("two", (ModeInterval(0, 0.0, 0.5), ModeInterval(1, 0.5, 2.0)))
     legs = tuple(sequence.cut([first, second], (k, 0), k, k + 1.0) for k in range(2))
     assert sequence.shown(legs) == "(+0)(++) | (++)(-+)"
     assert [arc.duration for arc in sequence.flat(legs)] == pytest.approx([0.5, 0.5, 0.2, 0.8])

@@ -20,7 +20,7 @@ from ocp.formulation.problem import Problem
 from ocp.transcription.intervals import FUNCTIONS, PointEquations
 from ocp.transcription.schemes import Legendre, Radau, Scheme, Shooting, make_meshes
 from ocp.transcription.transcribe import Transcription, discretise
-from ocp.transcription.unknowns import Points, SpanPoints
+from ocp.transcription.unknowns import SpanPoints, Values
 from symfric import Model, Variable
 
 LOW = [Radau(2), Legendre(2), Legendre(3)]
@@ -34,7 +34,7 @@ def cased(make: Callable[[], Problem]) -> Transcription:
 
 def motion(
     t: Transcription, x: Callable[[np.ndarray], Sequence[object]], u: float, *durations: float
-) -> Points:
+) -> Values:
     """The states x(time) of consecutive spans, and a constant input."""
     spans: list[SpanPoints] = []
     begin = 0.0
@@ -44,10 +44,10 @@ def motion(
         z = np.zeros((0, inner.size))
         spans.append(SpanPoints(T, *states, z, np.full((1, mesh.size - 1), u)))
         begin += T
-    return Points(tuple(spans))
+    return Values(tuple(spans))
 
 
-def values(t: Transcription, points: Points) -> tuple[float, np.ndarray]:
+def values(t: Transcription, points: Values) -> tuple[float, np.ndarray]:
     w = t.pack(points)
     f, _ = t.program.gradient(w, t.program.values)
     return float(f), t.program.jacobian(w, t.program.values)[0].full().ravel()
@@ -106,7 +106,7 @@ def test_conditions_at_starts_of_intervals_use_the_input_that_begins_there() -> 
         t = made.on([mesh])
         u = np.arange(1.0, mesh.size)[None]
         points = motion(t, lambda s: (s**3, 3 * s**2), 1.0, 1.0).spans[0]
-        _, g = values(t, Points((replace(points, u=u),)))
+        _, g = values(t, Values((replace(points, u=u),)))
         own = [i for i, place in enumerate(t.program.rows) if place.name == "the sum"]
         np.testing.assert_allclose(2.0 * g[own], mesh[1:-1] ** 3 + 10.0 * u[0, 1:])
         np.testing.assert_allclose([t.program.rows[i].fraction for i in own], mesh[1:-1])
@@ -181,7 +181,7 @@ def missed(method: str, steps: int) -> tuple[float, float]:
     phases = Phase(decay, 1.0, start={"x": 1.0}) >> Phase(decay, 0.5)
     made = on(Problem(phases, integral(lambda s: s.x)), 2, Shooting(method, steps))
     spans = motion(made, lambda s: (1 / (1 + s**2),), 0.0, 1.0, 0.5).spans
-    f, g = values(made, Points(tuple(replace(span, z=np.zeros((0, 0))) for span in spans)))
+    f, g = values(made, Values(tuple(replace(span, z=np.zeros((0, 0))) for span in spans)))
     return abs(f - np.arctan(1.5)), float(np.abs(g).max())
 
 

@@ -22,7 +22,7 @@ from ocp.formulation.phase import Phase
 from ocp.formulation.problem import Problem
 from ocp.transcription.schemes import Legendre, Radau, Scheme, Shooting, make_meshes
 from ocp.transcription.transcribe import Transcription, discretise
-from ocp.transcription.unknowns import Points, SpanPoints
+from ocp.transcription.unknowns import SpanPoints, Values
 from symfric import Model, Variable
 from symfric.multibody import PrescribedMotion
 
@@ -128,7 +128,7 @@ MODEL = four_bar()
 DRIVEN = {"theta_crank": 2.0, "theta_crank_rate": 0.0}
 
 
-def towards(t: Transcription, *ends: dict[int, float], T: float = 0.5) -> Points:
+def towards(t: Transcription, *ends: dict[int, float], T: float = 0.5) -> Values:
     """States from their start straight to the `ends` of each phase, moved onto the constraints."""
     spans: list[SpanPoints] = []
     for number, (span, end) in enumerate(zip(t.problem.spans, ends, strict=True)):
@@ -140,10 +140,10 @@ def towards(t: Transcription, *ends: dict[int, float], T: float = 0.5) -> Points
         nodes, points = (x[:, None] + s * change for s in (mesh, inner))
         z = np.tile([[float(v.start)] for v in model.z], (1, inner.size))
         spans.append(SpanPoints(T, nodes, points, z, np.zeros((len(model.u), mesh.size - 1))))
-    return t.consistent(Points(tuple(spans)))
+    return t.consistent(Values(tuple(spans)))
 
 
-def solved(t: Transcription, start: Points) -> Points:
+def solved(t: Transcription, start: Values) -> Values:
     p = t.program
     quiet = {"ipopt.print_level": 0, "print_time": False, "ipopt.sb": "yes", "ipopt.max_iter": 50}
     lean = {"no_nlp_grad": True, "calc_lam_p": False}
@@ -154,7 +154,7 @@ def solved(t: Transcription, start: Points) -> Points:
     return t.unpack(found["x"])
 
 
-def opening(points: Points) -> float:
+def opening(points: Values) -> float:
     """Largest residual of the loops and of their rates at the nodes."""
     mechanics, x = MODEL.holonomic, MODEL.vector("x")
     assert mechanics is not None

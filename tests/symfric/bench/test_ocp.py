@@ -11,7 +11,7 @@ import pytest
 from ocp.friction.event_check import set_valued
 from symfric.bench import ocp
 from symfric.bench.ocp import attempted, contenders
-from symfric.bench.ocp_cases import CASES, Case
+from symfric.bench.ocp_cases import CASES, MoveCase
 from symfric.bench.ocp_contenders import Attempt, opti
 from symfric.bench.ocp_referee import judged
 from symfric.integrator import Hold
@@ -21,7 +21,7 @@ BLOCK = KNOWN["pushed_block"]
 """1 kg with dry friction of 5.886 N, 10 m out and back in 4 s."""
 
 
-def even(case: Case, count: int) -> np.ndarray:
+def even(case: MoveCase, count: int) -> np.ndarray:
     return np.linspace(0.0, case.T, count + 1)
 
 
@@ -129,13 +129,13 @@ def test_the_referee_agrees_with_the_engine(name: str, mean: float, range: float
 
 
 def test_absent_and_failing_tools_are_rows() -> None:
-    def absent(case: Case, limit: float) -> Attempt:
+    def absent(case: MoveCase, limit: float) -> Attempt:
         raise ModuleNotFoundError("No module named 'nosnoc'", name="nosnoc")
 
-    def fails(case: Case, limit: float) -> Attempt:
+    def fails(case: MoveCase, limit: float) -> Attempt:
         raise RuntimeError("no  such\nthing")
 
-    def stopped(case: Case, limit: float) -> Attempt:
+    def stopped(case: MoveCase, limit: float) -> Attempt:
         return Attempt(0.0, "User_Requested_Stop", even(case, 1), np.zeros(1))
 
     assert attempted(absent, BLOCK, 1.0)[0] == "not installed: nosnoc"
@@ -148,10 +148,10 @@ def test_absent_and_failing_tools_are_rows() -> None:
 
 
 def test_rows_come_one_by_one_and_stay_after_an_interrupt(monkeypatch: pytest.MonkeyPatch) -> None:
-    def still(case: Case, limit: float) -> Attempt:
+    def still(case: MoveCase, limit: float) -> Attempt:
         return Attempt(7.0, "Solve_Succeeded", even(case, 2), np.zeros(2))
 
-    def interrupted(case: Case, limit: float) -> Attempt:
+    def interrupted(case: MoveCase, limit: float) -> Attempt:
         raise KeyboardInterrupt
 
     monkeypatch.setattr(ocp, "contenders", lambda quick: {"a": still, "b": interrupted, "c": still})

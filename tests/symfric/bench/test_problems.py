@@ -8,7 +8,7 @@ import pytest
 from symfric import BrownMcPhee, ExactCoulomb, Model, Variable, simulate
 from symfric.bench import ivp, multibody, regularisation
 from symfric.bench.ivp import ANDREWS, DIGITS, DRIFT, PROBLEMS, correct_digits
-from symfric.bench.ivp_problems import Problem
+from symfric.bench.ivp_problems import InitialValueProblem
 from symfric.bench.multibody import chain, chains, count, exponent
 from symfric.bench.regularisation import CASES, last_cycle, peak
 from symfric.bench.report import Row
@@ -26,7 +26,9 @@ MOST_STEPS = {
 """The squeezer in joint coordinates is a case of `multibody/test_loops.py`."""
 
 
-def reached(problem: Problem, method: str, rtol: float, engine: str | None = None) -> Row:
+def reached(
+    problem: InitialValueProblem, method: str, rtol: float, engine: str | None = None
+) -> Row:
     """A measurement with at least the required digits."""
     title, row = next(ivp.measure(problem, problem.model(), method, rtol, engine))
     assert title == DIGITS
@@ -71,16 +73,18 @@ def test_digits_are_those_of_the_worst_signal() -> None:
     hires = PROBLEMS[0].model
     run = simulate(hires(), 1.0, backend="vm", samples=2)
     end = run.final
-    other = Problem("off", hires, 1.0, {"y1": end["y1"], "y2": end["y2"] * (1 + 1e-4)})
+    other = InitialValueProblem("off", hires, 1.0, {"y1": end["y1"], "y2": end["y2"] * (1 + 1e-4)})
     digits, worst = correct_digits(other, run)
     assert (round(digits, 3), worst) == (4.0, "y2")
-    assert 15 < correct_digits(Problem("same", hires, 1.0, {"y1": end["y1"]}), run)[0] < 16
+    assert (
+        15 < correct_digits(InitialValueProblem("same", hires, 1.0, {"y1": end["y1"]}), run)[0] < 16
+    )
 
 
 def test_a_failure_is_noted_with_its_reason() -> None:
     y = Variable("y1", "1", start=1.0)
     model = Model("grow", x=(y,), ode=y.symbol**2)
-    problem = Problem("late", lambda: model, 1e3, {"y1": 1.0})
+    problem = InitialValueProblem("late", lambda: model, 1e3, {"y1": 1.0})
     (_, row), note = ivp.measure(problem, model, "rodas5p", 1e-6, "vm")
     assert isnan(row["correct digits"])
     assert "late, rodas5p: not run" in note and "grows without bound" in note

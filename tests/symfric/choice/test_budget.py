@@ -25,7 +25,7 @@ from symfric.choice.continuation import (
 )
 from symfric.choice.machine import Candidate, Reference
 from symfric.choice.measured import (
-    Motion,
+    ReferenceMotion,
     _holds,  # pyright: ignore[reportPrivateUsage]
     largest,
 )
@@ -206,7 +206,7 @@ def test_it_is_the_largest_round_step_that_stays_near(step: float, sampled: bool
     assert all(off(h) / size > share for h in (2e-3, 5e-3, 1e-2, 2e-2, 5e-2) if h > step)
     push: Input = Linear(FINE, np.sin(W * FINE)) if sampled else lambda t: ca.sin(W * t)  # pyright: ignore
     machine = Machine("drive", Drive, END, u={"force": push})
-    motion = Motion(("x",), FINE, exact(FINE)[None, :], np.array([size]))
+    motion = ReferenceMotion(("x",), FINE, exact(FINE)[None, :], np.array([size]))
     model = Drive(Viscous(sigma_2=C), m=1.0, N=1.0).model()
     found, why = largest(machine, model, "backward_euler", motion, share)
     assert why == ""

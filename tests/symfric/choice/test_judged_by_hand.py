@@ -24,8 +24,8 @@ from symfric.choice.ranking import (
     INACCURATE,
     RANKED,
     REFUSED,
+    RankedLaw,
     Ranking,
-    Row,
     number,
     ordered,
     short,
@@ -43,13 +43,13 @@ from symfric.foundation.parameters import parameters
 from symfric.laws import ALL_LAWS, GMS, BrownMcPhee, Gonthier, LeineSwitch, LuGre, steady_force
 from symfric.scenes import Rabinowicz
 
-ROW = Row(
+ROW = RankedLaw(
     "a", RANKED, error=1e-5, method="Rodas5P", attempts=10, instructions=100, time_s=1e-3,
     steepness=5.0, smoothness="C∞", c_operations=100, fixed_step=0.01,
 )  # fmt: skip
 
 
-def verdict(rows: Sequence[Row]) -> tuple[str, ...]:
+def verdict(rows: Sequence[RankedLaw]) -> tuple[str, ...]:
     choice = Ranking("m", ("stiction",), 1e-4, "", "", 0.0, 0.05, 1.0, tuple(rows), 0.0)
     return choice.verdict
 

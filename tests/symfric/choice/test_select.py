@@ -15,7 +15,7 @@ import pytest
 from refusing import not_refused
 
 from symfric import Model, Trajectory, Variable, simulate, with_values
-from symfric.choice import Choice, Friction, Row, select
+from symfric.choice import Choice, Friction, RankedLaw, select
 from symfric.choice.continuation import RUN
 from symfric.choice.nature import forms
 from symfric.choice.ranking import lines
@@ -45,7 +45,7 @@ def test_every_candidate_has_a_row_with_its_standing(choice: Choice) -> None:
     assert all(row.reason for row in choice if not row.ranked)
 
 
-def again(row: Row, rtol: float) -> Trajectory:
+def again(row: RankedLaw, rtol: float) -> Trajectory:
     """Return the run of a row, or one at another tolerance."""
     law = with_values(ALL_LAWS[row.law](), row.values or {})
     t = np.linspace(0, SHORT, 2001)

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from symfric.cli import campaigns, demo, main
 from symfric.gallery import rendering
 from symfric.gallery.rendering import Gallery
-from symfric.stress import Case, Report, Verdict, draw
+from symfric.stress import Case, Judgement, Report, draw
 from symfric.stress.judge import CLASSES
 
 PNG = b"\x89PNG"
@@ -62,14 +62,14 @@ def test_a_campaign_prints_a_table_and_writes_json(symfric) -> None:
 
 
 def test_a_failing_campaign_saves_its_cases(symfric, monkeypatch: pytest.MonkeyPatch) -> None:
-    report = Report(1, 3, {0: Verdict("silent", "far off"), 1: Verdict("right")}, 1.0)
+    report = Report(1, 3, {0: Judgement("silent", "far off"), 1: Judgement("right")}, 1.0)
     monkeypatch.setattr("symfric.stress.campaign.campaign", lambda *_, **__: report)
     printed = symfric("stress --out .", 1)
     assert Case.read(Path("silent_1_0.json")) == draw(1, 0)
     assert "Interrupted: 1 of 3 cases were not run." in printed.out
     assert all(name in printed.out for name in CLASSES)
     assert "silent_1_0.json" in printed.err
-    monkeypatch.setattr("symfric.stress.campaign.rerun", lambda *_: Verdict("silent", "far off"))
+    monkeypatch.setattr("symfric.stress.campaign.rerun", lambda *_: Judgement("silent", "far off"))
     printed = symfric("stress --case silent_1_0.json", 1)
     case = draw(1, 0)
     assert (
@@ -85,7 +85,7 @@ def test_files_are_written_while_a_campaign_runs(
     """A machine that is switched off loses one minute of a long campaign."""
 
     def killed(*_: object, progress: Callable[[Report], None], **__: object) -> Report:
-        progress(Report(1, 3, {0: Verdict("silent", "far off")}, 1.0))
+        progress(Report(1, 3, {0: Judgement("silent", "far off")}, 1.0))
         raise RuntimeError
 
     monkeypatch.setattr("symfric.stress.campaign.campaign", killed)

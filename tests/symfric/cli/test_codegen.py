@@ -18,7 +18,7 @@ from symfric.cli import codegen as command
 from symfric.cli.codegen_report import compared, show_verification
 from symfric.codegen import Block, Proof
 from symfric.codegen.verification import Check, Verification
-from symfric.embedded import Measured
+from symfric.embedded import BlockMeasurement
 from symfric.scenes import ALL_SCENES
 
 pytestmark = needs_compiler
@@ -109,7 +109,7 @@ def test_a_problem_becomes_a_controller(symfric, monkeypatch) -> None:
     assert {p.name for p in Path("c").iterdir()} == {
         "drive_mpc.c", "drive_mpc.h", "drive_mpc_f32.c", "drive_mpc_f32.h"
     }  # fmt: skip
-    measured = Measured("drive_mpc", "float", "m7", average=2.5e5, maximum=6e5, finite=True)
+    measured = BlockMeasurement("drive_mpc", "float", "m7", average=2.5e5, maximum=6e5, finite=True)
     monkeypatch.setattr("ocp.mpc.target.measure_controller", lambda *given: measured)
     shown = symfric("codegen --mpc move.py:quick --out c --real float --core m7").out
     assert "250000" in shown and "600000" in shown
@@ -247,10 +247,10 @@ def test_sizes_are_measured_on_cores_without_a_compiler(
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.delenv("CC", raising=False)
 
-    def measure(block: Block, real: str, core: str, **_: object) -> Measured:
+    def measure(block: Block, real: str, core: str, **_: object) -> BlockMeasurement:
         if core == "m3":
-            return Measured(block.name, real, core, status="no QEMU")
-        return Measured(
+            return BlockMeasurement(block.name, real, core, status="no QEMU")
+        return BlockMeasurement(
             block.name, real, core, average=12.4, maximum=15.0, text=88.0, stack=16.0, finite=True,
             regimes={"rest": 3.0, "sliding": 14.0},
         )  # fmt: skip

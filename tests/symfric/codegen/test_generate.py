@@ -19,7 +19,7 @@ from tables import Names, table
 
 from symfric import BrownMcPhee, LuGre, Model, Output, Variable, Viscous, drive, law_from_text
 from symfric.codegen import Block, generate, law_block, plant_block
-from symfric.codegen.blocks.block import CBlock, Elements
+from symfric.codegen.blocks.block import CBlock, ElementArray
 from symfric.codegen.runner import run_vm
 from symfric.codegen.source import header, interval, routines, source
 from symfric.codegen.verification import excitation
@@ -145,7 +145,7 @@ def test_ranges_of_members_are_common_and_defaults_of_an_array_are_its_ends():
     x = [Variable(f"x_{i}", "m", doc="place" if i < 3 else "end") for i in (1, 2, 3)]
     for size, doc in ((2, "place, of each element"), (3, "of each element")):
         y = {n: Output(x[0].symbol, "m") for n in "yz"}
-        made = Block("b", inputs=tuple(x), outputs=y, arrays=(Elements("in", "x", 0, size),))
+        made = Block("b", inputs=tuple(x), outputs=y, arrays=(ElementArray("in", "x", 0, size),))
         assert made.members["in"][0].doc == doc
 
 

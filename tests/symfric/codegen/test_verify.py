@@ -12,7 +12,7 @@ from tables import Names, table
 from symfric import BrownMcPhee, LuGre, Model, Output, Stribeck, Variable, law_from_text
 from symfric.codegen import Block, generate, guards, law_block, plant_block, verify
 from symfric.codegen.blocks.block import CBlock
-from symfric.codegen.compared import Run, magnitudes, modes, rounded, terms, ulp
+from symfric.codegen.compared import ComparedRun, magnitudes, modes, rounded, terms, ulp
 from symfric.codegen.runner import in_type, run_vm
 from symfric.codegen.verification import excitation, longest_step, runs_away, spoiled, varied
 from symfric.compensation import (
@@ -139,7 +139,7 @@ def test_last_places_are_counted_across_zero_and_states_have_their_nominal_value
     assert magnitudes(block, np.ones((3, 1)), np.zeros(0), np.zeros((3, 0))).tolist() == [5.0]
 
 
-def in_float(block: Block, inputs: np.ndarray, change: dict | None = None) -> Run:
+def in_float(block: Block, inputs: np.ndarray, change: dict | None = None) -> ComparedRun:
     """Run of a block without states in float, with operations rounded, and some changed results."""
     c = CBlock(block, FLOAT, guards=False)
     inputs = FLOAT.rounded(inputs)
@@ -147,7 +147,7 @@ def in_float(block: Block, inputs: np.ndarray, change: dict | None = None) -> Ru
     rows = in_type(block.step, [p, p, inputs.astype("f4")], "f4")
     for place, value in (change or {}).items():
         rows[place] = value
-    return Run(c, inputs, None, rows, run_vm(c, inputs))
+    return ComparedRun(c, inputs, None, rows, run_vm(c, inputs))
 
 
 def test_the_worst_signal_is_the_one_with_the_largest_error_relative_to_its_magnitude():
@@ -155,7 +155,7 @@ def test_the_worst_signal_is_the_one_with_the_largest_error_relative_to_its_magn
     c, inputs = CBlock(Block("pair", inputs=(A,), outputs=outputs), FLOAT), np.array([[3.0], [1.1]])
     expected = run_vm(c, inputs)
     rows = expected + np.array([[0.0] * 3, [1e-2, 1e-3, 0.0]])
-    run = Run(c, inputs, None, rows, expected)
+    run = ComparedRun(c, inputs, None, rows, expected)
     assert run.worst == "small"
     assert run.error == pytest.approx(1e-3 / 9.0)  # of 3 squared
     assert 0.0 < run.rounding < 1e-7

@@ -15,7 +15,7 @@ from tables import Names, table
 
 from symfric import Output, Variable
 from symfric.codegen import Block
-from symfric.codegen.blocks.block import CBlock, Elements
+from symfric.codegen.blocks.block import CBlock, ElementArray
 from symfric.codegen.runner import run_vm
 from symfric.codegen.source import source
 from symfric.emitter.c99 import DOUBLE, FORMS, FUNCTIONS
@@ -180,8 +180,8 @@ def elements(seed: int, odd: bool) -> Block:
         f"e_{seed}", states=(*x, *y), inputs=u, parameters=k,
         next=ca.vertcat(*(m[-1] for m in made), *(m[-3] for m in made)),
         outputs={f"s_{j}": Output(e, "1") for j, e in enumerate([*sums, total * made[2][-1]])},
-        arrays=(Elements("state", "x", 0, N), Elements("state", "y", N, N),
-                Elements("param", "k", 0, N)),
+        arrays=(ElementArray("state", "x", 0, N), ElementArray("state", "y", N, N),
+                ElementArray("param", "k", 0, N)),
     )  # fmt: skip
 
 

@@ -29,7 +29,7 @@ from symfric.foundation.parameters import Variable
 from symfric.foundation.shown import (
     WIDTH,
     Shown,
-    Table,
+    TextTable,
     among,
     brief,
     counted,
@@ -229,18 +229,18 @@ EVIL = '<script>alert("&")</script>'
 
 
 def test_everything_of_a_user_is_escaped() -> None:
-    page = parsed(Shown(EVIL, (EVIL,), Table((EVIL, ""), ((EVIL, "1"),)), (EVIL,)).html())
+    page = parsed(Shown(EVIL, (EVIL,), TextTable((EVIL, ""), ((EVIL, "1"),)), (EVIL,)).html())
     assert page.words.count(EVIL) == 5
 
 
 def test_a_long_table_names_what_it_leaves_out() -> None:
     rows = tuple((f"row{k}", f"{k}") for k in range(40))
-    text = Shown("many", ("one",), Table(("name", "n"), rows, numbers=(1,)), ("last",)).text()
+    text = Shown("many", ("one",), TextTable(("name", "n"), rows, numbers=(1,)), ("last",)).text()
     assert on_a_screen(text)
     assert text.splitlines()[-1] == "last"
     assert "... 20 more: row20, row21" in text
     assert text.splitlines()[2:4] == ["  name    n", "  row0    0"]
-    assert parsed(Shown("many", (), Table(("name", "n"), rows)).html()).words.count("row") == 40
+    assert parsed(Shown("many", (), TextTable(("name", "n"), rows)).html()).words.count("row") == 40
 
 
 def test_words_for_counts_and_values() -> None:

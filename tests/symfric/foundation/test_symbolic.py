@@ -16,7 +16,7 @@ from symfric.foundation.graph import SELECT, graph, rebuild
 from symfric.foundation.numeric import asinh, atan, column, cos, erf, exp, log, sin, sqrt, tanh
 from symfric.foundation.symbolic import plain, with_symbols
 from symfric.foundation.variable import at_start, stacked, starts_of, strays, symbols_of
-from symfric.foundation.vector import NotIsotropicError, Rows, Vector
+from symfric.foundation.vector import NotIsotropicError, Vector, VectorRows
 from symfric.laws.base import smooth
 from symfric.laws.dynamic.element import ahead, along, onward, spent, yielding
 from symfric.multibody import JointFriction, Mechanism, Revolute
@@ -261,7 +261,7 @@ def test_numbers_of_any_kind_scale_from_both_sides(kind: type) -> None:
 
 def test_columns_with_vectors_keep_them_as_rows() -> None:
     rows = column(a, 1.0, ca.SX.sym("q"))
-    assert isinstance(rows, Rows)
+    assert isinstance(rows, VectorRows)
     assert rows.shape == (3,)
     assert rows[0] is a
 

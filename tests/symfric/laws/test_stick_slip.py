@@ -13,7 +13,7 @@ from symfric import Coulomb, Law, Sum, Viscous, drive, rabinowicz, simulate
 from symfric.foundation.numeric import Scalar
 from symfric.integrator import Linear
 from symfric.laws import ExactCoulomb, HaessigFriedland, Karnopp, LeineSwitch
-from symfric.laws.dynamic.element import Held
+from symfric.laws.dynamic.element import ConstantStep
 from symfric.scenes import Rabinowicz
 
 LOAD = 0.8 * 9.81
@@ -264,18 +264,18 @@ def fine(F: float, v: float, count: int = 4000) -> tuple[float, float]:
 
 def test_end_and_mean_of_a_held_step_are_those_of_small_steps() -> None:
     for v, F in product((0.0, 0.3, -0.3, 0.9, -1.1, 2.5, -2.5), (0.0, 0.4, -0.4, 0.999, -1.0)):
-        end, mean, mode = Held.over(v, H).yielded(F, 0.25, K, LIMIT)
+        end, mean, mode = ConstantStep.over(v, H).yielded(F, 0.25, K, LIMIT)
         exact = fine(F, v)
         assert end == pytest.approx(exact[0], abs=1e-12)
         assert mean == pytest.approx(exact[1], abs=1e-4)
         assert mode == (0.25 if v == 0 else float(abs(exact[0]) == LIMIT and exact[0] * v > 0))
     # an element beyond its limit returns at once when it is moved on
-    assert Held.over(0.1, H).yielded(3.0, 0.0, K, LIMIT) == (LIMIT, LIMIT, 1.0)
+    assert ConstantStep.over(0.1, H).yielded(3.0, 0.0, K, LIMIT) == (LIMIT, LIMIT, 1.0)
 
 
 def test_derivatives_of_a_held_step_are_those_of_the_course_that_is_taken() -> None:
     F, speed, k = (ca.SX.sym(name) for name in ("F", "v", "k"))
-    rows = ca.vertcat(*Held.over(speed, H).yielded(F, ca.SX(0), k, LIMIT)[:2])
+    rows = ca.vertcat(*ConstantStep.over(speed, H).yielded(F, ca.SX(0), k, LIMIT)[:2])
     given = ca.vertcat(F, speed, k)
     derivative = ca.Function("d", [given], [ca.jacobian(rows, given)])
     for v in (0.0, 0.3, 2.5):

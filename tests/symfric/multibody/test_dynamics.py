@@ -14,18 +14,18 @@ from symfric.foundation.parameters import Variable
 from symfric.multibody.dynamics import kinetic_energy
 from symfric.multibody.equations import equations
 from symfric.multibody.forces import Force
-from symfric.multibody.prepare import Prepared
+from symfric.multibody.prepare import Assembled
 from symfric.scenes import MECHANISMS, Arm, FourMass
 
 both_ways = pytest.mark.parametrize("reverse", [False, True])
 
 
 @cache
-def prepared(reverse: bool) -> Prepared:
+def prepared(reverse: bool) -> Assembled:
     return chain(reverse).prepare()
 
 
-def accelerations(made: Prepared, q: np.ndarray, qd: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def accelerations(made: Assembled, q: np.ndarray, qd: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Random accelerations that keep Euler parameters of length one, and what they may not move."""
     a, free = np.random.default_rng(4).normal(size=made.eq.n), np.eye(made.eq.n)
     for link in made.eq.kin.topology.links:
@@ -87,7 +87,7 @@ def test_velocities_and_accelerations_are_derivatives_of_positions(reverse: bool
 
 
 @cache
-def loaded(formulation: str, bearing: mb.JointFriction | None = None) -> Prepared:
+def loaded(formulation: str, bearing: mb.JointFriction | None = None) -> Assembled:
     """The chain with every kind of force, and friction in all joints that have any."""
     m = chain()
     m.joints = [replace(j, friction=bearing if j.rubs else None) for j in m.joints]
@@ -162,7 +162,7 @@ CONSERVATIVE: dict[str, Force] = {
 
 
 @cache
-def made_in(formulation: str, reverse: bool) -> Prepared:
+def made_in(formulation: str, reverse: bool) -> Assembled:
     return chain(reverse).prepare(formulation=formulation)
 
 

@@ -18,7 +18,7 @@ from symfric.page.svg import (
     Dots,
     Frame,
     Level,
-    Path,
+    Polyline,
     Stems,
     around,
     chart,
@@ -29,10 +29,12 @@ NASTY = "<script>alert('1')</script> & \"x\""
 
 def test_points_are_at_their_numbers_and_a_missing_number_splits_a_line() -> None:
     x, y = Axis("t", "s", 0.0, 10.0), Axis("v", "m/s", -1.0, 1.0)
-    drawn = chart("v", x, y, [Path("line", np.array([0.0, 5.0, 10.0]), np.array([-1.0, 0.0, 1.0]))])
+    drawn = chart(
+        "v", x, y, [Polyline("line", np.array([0.0, 5.0, 10.0]), np.array([-1.0, 0.0, 1.0]))]
+    )
     w, h = 920 - LEFT - RIGHT, 230 - TOP - BOTTOM
     assert findall(r'points="([^"]*)"', drawn) == [f"0,{h:g} {w / 2:g},{h / 2:g} {w:g},0"]
-    line = Path("line", np.arange(7.0), np.array([0.0, 1.0, np.nan, 1.0, 0.0, np.nan, np.nan]))
+    line = Polyline("line", np.arange(7.0), np.array([0.0, 1.0, np.nan, 1.0, 0.0, np.nan, np.nan]))
     drawn = line.draw(Frame(Axis("x", "", 0.0, 6.0), Axis("y", "", 0.0, 1.0), 60.0, 10.0))
     assert findall(r'points="([^"]*)"', drawn) == ["0,10 10,0", "30,0 40,10"]
     stems = Stems("stem", np.arange(3.0), np.array([1.0, np.nan, 0.5]))
@@ -70,7 +72,7 @@ def test_labels_have_whole_counts_and_powers_of_ten() -> None:
         assert axis.label == label
     for y in (np.full(3, np.nan), np.full(3, 7.0), np.zeros(0)):  # no numbers, or no range
         x = np.arange(float(y.size))
-        drawn = chart("x", around("x", "", [x]), around("y", "", [y]), [Path("a", x, y)])
+        drawn = chart("x", around("x", "", [x]), around("y", "", [y]), [Polyline("a", x, y)])
         ET.fromstring(drawn)
         assert "nan" not in drawn
 
@@ -79,7 +81,7 @@ def test_every_chart_is_xml_with_a_title_and_a_description() -> None:
     x, y = Axis(NASTY, "s", 0.0, 1.0), Axis("y", NASTY, 0.0, 1.0)
     ones = np.array([0.2, 0.8, 5e9])
     marks = [
-        Path("a", ones, ones, NASTY), Dots("b", ones, ones, "dots"), Stems("c", ones, ones),
+        Polyline("a", ones, ones, NASTY), Dots("b", ones, ones, "dots"), Stems("c", ones, ones),
         Level("d", 0.5), Level("e", 7.0), Level("f", 0.2, upright=True), Band("g", -1.0, 2.0),
     ]  # fmt: skip
     root = ET.fromstring(chart(NASTY, x, y, marks, says=NASTY))
@@ -94,7 +96,7 @@ def test_every_chart_is_xml_with_a_title_and_a_description() -> None:
 def test_coincident_points_are_omitted() -> None:
     x = np.linspace(0, 1, 100_000)
     frame = Frame(Axis("x", "", 0, 1), Axis("y", "", -1, 1), 600, 200)
-    line, dots = (kind("a", x, np.zeros(x.size)).draw(frame) for kind in (Path, Dots))
+    line, dots = (kind("a", x, np.zeros(x.size)).draw(frame) for kind in (Polyline, Dots))
     assert len(line) < 80_000
     assert dots.count("M") <= 6001
 

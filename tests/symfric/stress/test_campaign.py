@@ -22,8 +22,8 @@ from symfric.foundation.workers import Crashed, TimedOut
 from symfric.stress import Case, Signal, draw
 from symfric.stress.campaign import Report, campaign, rerun
 from symfric.stress.cases import Draws
-from symfric.stress.judge import CLASSES, FAILING, Verdict, by_methods, judge
-from symfric.stress.problem import RIGHT, Problem, of, problem, signal
+from symfric.stress.judge import CLASSES, FAILING, Judgement, by_methods, judge
+from symfric.stress.problem import RIGHT, CaseProblem, of, problem, signal
 
 COSTLY = ("arm", "four_bar", "double_pendulum")
 """Scenes of which the suite takes no case."""
@@ -72,10 +72,10 @@ def test_a_case_runs_again_in_its_own_process() -> None:
 
 def test_a_report_counts_classes_and_keeps_failing_cases(tmp_path: Path) -> None:
     verdicts = {
-        0: Verdict("right", "", "", 0.5, by="referee"),
-        1: Verdict("silent", "1e6 tolerances off", "", 1e6),
-        2: Verdict("refused", "no", "input"),
-        3: Verdict("loose", "20 tolerances off", "", 20.0),
+        0: Judgement("right", "", "", 0.5, by="referee"),
+        1: Judgement("silent", "1e6 tolerances off", "", 1e6),
+        2: Judgement("refused", "no", "input"),
+        3: Judgement("loose", "20 tolerances off", "", 20.0),
     }
     report = Report(7, 5, verdicts, 12.04)
     data = json.loads(json.dumps(report.to_dict(), allow_nan=False))
@@ -218,10 +218,10 @@ class Wrong:
     """`simulate` as it would be with a defect: `harm` is done to the case's own run."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch, harm: str) -> None:
-        self.right, self.harm = Problem.run, harm
-        monkeypatch.setattr(Problem, "run", lambda *args, **known: self.run(*args, **known))
+        self.right, self.harm = CaseProblem.run, harm
+        monkeypatch.setattr(CaseProblem, "run", lambda *args, **known: self.run(*args, **known))
 
-    def run(self, ready: Problem, rtol: float, method: str, **known: object) -> object:
+    def run(self, ready: CaseProblem, rtol: float, method: str, **known: object) -> object:
         if rtol != EASY.rtol:
             return self.right(ready, rtol, method, **known)
         if self.harm == "fails":
@@ -244,7 +244,7 @@ def test_a_defect_is_found(monkeypatch: pytest.MonkeyPatch, harm: str, kind: str
 
 
 def test_a_foreign_exception_comes_through(monkeypatch: pytest.MonkeyPatch) -> None:
-    def foreign(*_: object) -> Problem:
+    def foreign(*_: object) -> CaseProblem:
         raise ZeroDivisionError("division by zero")
 
     monkeypatch.setattr("symfric.stress.judge.problem", foreign)

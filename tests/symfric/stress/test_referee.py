@@ -16,7 +16,7 @@ from symfric.laws import ALL_LAWS
 from symfric.stress import referee
 from symfric.stress.cases import Case, Signal
 from symfric.stress.problem import problem
-from symfric.stress.referee import Motion, knows, solve
+from symfric.stress.referee import SmoothPiece, knows, solve
 from symfric.stress.referee_equations import LAWS, SCENES, SIGNS
 
 PAIRS = [(law, scene) for scene in SCENES for law in LAWS if knows(law, scene)]
@@ -57,7 +57,7 @@ class Both:
     def rates(self, rng: np.random.Generator) -> tuple[Array, Array]:
         """Rates of the machine and, but for modes, of the law at a state and a time by chance."""
         t, nominal = rng.uniform(0.01, 7.9), self.model.nominal("x")
-        motion = Motion(self.requested, t - 1e-6, t + 1e-6)
+        motion = SmoothPiece(self.requested, t - 1e-6, t + 1e-6)
         x = rng.normal(size=nominal.size) * nominal * 10 ** rng.uniform(-2, 0.7)
         if self.case.scene == "quarter_car":
             x[:2] = rng.normal(size=2) * 0.05
@@ -72,7 +72,7 @@ class Both:
         n = motion.scene.states if self.case.law == "exact_coulomb" else None
         return ours[:n], theirs[:n]
 
-    def guess(self, motion: Motion) -> list[float]:
+    def guess(self, motion: SmoothPiece) -> list[float]:
         """Normal and applied forces of the referee: symfric's equations have to hold for them."""
         names = ["x", "phi"] if self.case.scene == "pendulum_box" else ["phi"]
         loads = dict(zip(names, motion.loads, strict=True))

@@ -13,7 +13,7 @@ from tables import Names, table
 
 import symfric as sf
 from symfric.codegen import Block, contact_block, law_block, plant_block
-from symfric.codegen.blocks.block import CBlock, Elements
+from symfric.codegen.blocks.block import CBlock, ElementArray
 from symfric.codegen.blocks.variables import arranged, families, in_arrays, numbered
 from symfric.codegen.runner import run_vm
 from symfric.codegen.source import routines, source
@@ -173,7 +173,7 @@ def test_a_family_without_a_loop_stays_single_and_guarded_inputs_are_not_indexed
     many = tuple(sf.Variable(f"x_{i}", "m") for i in range(1, 9))
     total = sum((v.symbol**2 * ca.sin(v.symbol) for v in many), start=ca.SX(0))
     outputs = {"y": sf.Output(total, "m"), "z": sf.Output(2 * total, "m")}
-    looped = Block("b", inputs=many, outputs=outputs, arrays=(Elements("in", "x", 0, 8),))
+    looped = Block("b", inputs=many, outputs=outputs, arrays=(ElementArray("in", "x", 0, 8),))
     for guards in (False, True):
         lines = routines(CBlock(looped, DOUBLE, guards))[-1].statements
         assert any("in->x[i]" in line for line in lines) is not guards

@@ -30,7 +30,7 @@ from symfric.integrator.equations.system import system
 from symfric.integrator.many.chunk import Chunk, Job, Solved, digest
 from symfric.integrator.many.member_data import Store
 from symfric.integrator.many.members import Assembly, program
-from symfric.integrator.methods.attempt import Given, State
+from symfric.integrator.methods.attempt import Given, SRow
 from symfric.integrator.methods.tableaux import RODAS5P
 from symfric.integrator.running.integrator import Integrator
 from symfric.scenes import Pendulum
@@ -267,7 +267,7 @@ def task(
     inputs = input_data(model, u, 0.0, 1.0)
     integrator = Integrator(model, inputs, RODAS5P)
     p, atol = model.values("p"), 1e-7 * integrator.system.nominal
-    S = State.at(0.0, 1e-8, start)
+    S = SRow.at(0.0, 1e-8, start)
     R = Given.of(1.0, 1e-6, 1.0, atol, [*p, *inputs.values[:, 0]])
     times = np.array([0.0, 0.5, 1.0])
     job = Job(program(integrator), inputs.breaks, times, 10_000)

@@ -16,7 +16,7 @@ from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.many import vectors
 from symfric.integrator.many.members import CompiledMembers, Stretch, many_source
 from symfric.integrator.many.vectors import lanes_header, vector_source
-from symfric.integrator.methods.attempt import Given, State
+from symfric.integrator.methods.attempt import Given, SRow
 from symfric.integrator.methods.tableaux import RODAS5P
 from symfric.integrator.running.integrator import Integrator
 
@@ -174,7 +174,7 @@ def run(
 ) -> tuple:
     """Return all results of members over [0, ends]."""
     model, inputs, members = made(make, 3.0, lanes)
-    S = State.at(0.0, 1e-8, starts)
+    S = SRow.at(0.0, 1e-8, starts)
     d = np.hstack([p, np.tile(inputs.values[:, 0], (starts.shape[0], 1))])
     R = Given.of(0.0, 1e-6, np.inf, 1e-7 * model.nominal("x"), d)
     attempts, h_min = np.zeros(starts.shape[0], dtype=np.int64), np.full(starts.shape[0], 1e-23)
@@ -218,7 +218,7 @@ def test_a_member_does_not_depend_on_lanes_and_neighbours(lanes: int) -> None:
                 np.testing.assert_array_equal(a[m], b[0])
     burst, swing, (found, reason, _, S, attempts) = whole
     assert reason.tolist() == [0] * 7
-    assert S[:, State.T].tolist() == [3.0, 1e-4, 0.5, 3.0, 1.0, 2.0, 0.35]
+    assert S[:, SRow.T].tolist() == [3.0, 1e-4, 0.5, 3.0, 1.0, 2.0, 0.35]
     assert np.isfinite(found[:, :, 0]).sum(axis=1).tolist() == [5, 1, 3, 5, 4, 4, 3]
     assert attempts[1] < attempts[0] / 5
     assert swing[1].tolist() == [0, 0, 2, 0, 3, 0, 0]

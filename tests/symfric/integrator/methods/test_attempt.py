@@ -27,7 +27,7 @@ from symfric.integrator.methods.attempt import (
     REACH,
     SHRINK,
     Given,
-    State,
+    SRow,
     Watch,
     build_fixed,
     build_step,
@@ -42,7 +42,7 @@ from symfric.scenes import Pendulum
 
 x, y, z = (Variable(name, "1", start=float(name != "z")) for name in "xyz")
 X, Y, Z = x.symbol, y.symbol, z.symbol
-T_AT, H, H_OLD, REJECTED, MEMORY = State.T, State.H, State.H_OLD, State.REJECTED, State.MEMORY
+T_AT, H, H_OLD, REJECTED, MEMORY = SRow.T, SRow.H, SRow.H_OLD, SRow.REJECTED, SRow.MEMORY
 each_kind = pytest.mark.parametrize("kind", [ca.SX, ca.MX], ids=["flat", "blocks"])
 
 
@@ -148,9 +148,9 @@ def test_growth_and_shrinkage_of_a_step_are_bounded_and_forbidden_after_a_reject
 def test_step_that_follows_a_better_one_is_the_more_careful() -> None:
     """Gustafsson: h_next = 0.85 h min(g, (h / h_old) g^2 / g_old), g = err^(-1/5)."""
     steady, rising = column((1.0, 1.0), h=0.03), column((1.0, 1.0), h=0.03)
-    growth = attempt(smooth_ode(), steady, rtol=1e-7)[State.GROWTH_OLD]
+    growth = attempt(smooth_ode(), steady, rtol=1e-7)[SRow.GROWTH_OLD]
     assert 1.0 < growth < 2.5
-    steady[State.GROWTH_OLD], rising[State.GROWTH_OLD] = growth, 1.5 * growth
+    steady[SRow.GROWTH_OLD], rising[SRow.GROWTH_OLD] = growth, 1.5 * growth
     ends = [attempt(smooth_ode(), before, rtol=1e-7)[H] for before in (steady, rising)]
     assert ends == pytest.approx([0.03 * 0.85 * growth, 0.03 * 0.85 * growth / 1.5], rel=1e-12)
 

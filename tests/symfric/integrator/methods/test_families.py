@@ -20,7 +20,7 @@ from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.methods.attempt import (
     KAPPA,
     Given,
-    State,
+    SRow,
     build_dense_step,
     build_fixed,
     build_step,
@@ -168,9 +168,9 @@ def test_failed_iteration_is_rejected_and_the_step_halved(kind: type) -> None:
     model = sf.Model("cubic", x=(x,), ode=-1000 * (x.symbol - 1) ** 3)
     step = build_step(assemble(model), RADAU5, kind)
     R = Given.of(1.0, 0.05, 1.0, [0.05], [])  # an error of this size would be allowed
-    after = step(State.at(0.0, 0.01, [2.0]), R)[0].full().ravel()
-    assert after[State.Y].tolist() == [2.0]
-    assert after[State.H] == pytest.approx(0.005)
+    after = step(SRow.at(0.0, 0.01, [2.0]), R)[0].full().ravel()
+    assert after[SRow.Y].tolist() == [2.0]
+    assert after[SRow.H] == pytest.approx(0.005)
 
 
 @pytest.mark.parametrize("law", [sf.BrownMcPhee(), sf.LuGre()], ids=["brown_mcphee", "lugre"])

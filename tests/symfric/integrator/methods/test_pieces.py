@@ -13,7 +13,7 @@ from symfric.foundation.numeric import Array
 from symfric.integrator.compiled.compiler import load
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.equations.system import system
-from symfric.integrator.methods.attempt import Given, State, build_step
+from symfric.integrator.methods.attempt import Given, SRow, build_step
 from symfric.integrator.methods.pieces import Written, all_macros, in_c, macros, routine
 from symfric.integrator.methods.tableaux import METHODS
 
@@ -33,7 +33,7 @@ def test_an_attempt_has_the_bits_of_the_virtual_machine(kind: object) -> None:
     whole = system(model, input_data(model, None, 0.0, 1.0))
     step = build_step(whole, METHODS["rodas5p"], kind)
     made = library(in_c(step, "made", ("S", "R"), ("next", "D"), head=""))
-    S = State.at(0.0, 1e-3, np.array([0.01, 0.02]))
+    S = SRow.at(0.0, 1e-3, np.array([0.01, 0.02]))
     R = Given.of(1.0, 1e-6, np.inf, np.full(2, 1e-7), np.zeros(whole.d.numel()))
     ours, D = np.empty(step.numel_out(0)), np.empty(step.numel_out(1))
     for _ in range(30):
@@ -42,7 +42,7 @@ def test_an_attempt_has_the_bits_of_the_virtual_machine(kind: object) -> None:
         np.testing.assert_array_equal(ours, after)
         np.testing.assert_array_equal(D, bend)
         S[:] = after
-    assert S[State.T] > 0.01
+    assert S[SRow.T] > 0.01
 
 
 def test_a_result_without_a_name_is_left_out_with_all_that_only_it_takes() -> None:

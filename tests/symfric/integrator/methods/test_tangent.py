@@ -12,7 +12,7 @@ from symfric import BrownMcPhee, Model, flow, simulate
 from symfric.foundation.parameters import symbolise
 from symfric.integrator.equations.system import System
 from symfric.integrator.methods.attempt import tangent
-from symfric.integrator.methods.tangent import Tangent
+from symfric.integrator.methods.tangent import TangentChart
 from symfric.multibody import Mechanism, PrescribedMotion
 from symfric.scenes import FourBar, FourMass, MechanismScene, PendulumBox, SliderCrank
 
@@ -41,7 +41,7 @@ def built(name: str, index: int = 0, rubs: bool = True) -> Model:
     return made.build(index=index)
 
 
-def unknowns(model: Model) -> tuple[System, Tangent]:
+def unknowns(model: Model) -> tuple[System, TangentChart]:
     whole = assemble(model)
     chart = tangent(whole)
     assert chart is not None

@@ -23,7 +23,7 @@ import symfric.integrator.running.integrator as module
 import symfric.integrator.running.run as running
 from symfric import BrownMcPhee, LuGre, Model, rabinowicz
 from symfric.foundation.numeric import Array
-from symfric.integrator.methods.attempt import Given, State, build_step
+from symfric.integrator.methods.attempt import Given, SRow, build_step
 from symfric.integrator.methods.tableaux import ADAPTIVE, RODAS5P
 from symfric.integrator.running import run
 from symfric.integrator.running.engine import CompiledEngine, Engine, VmEngine, Work, loop_source
@@ -262,9 +262,9 @@ def marched(
     runner: Engine, S: Array, R: Array, rows: int, attempts: int, h_min: float, dense: int = ROWS
 ) -> tuple[Array, int, Stop]:
     """Advance S up to the end in R; records, attempts made, why it stopped."""
-    work = Work(S.size - State.MEMORY, R.size, dense, rows)
+    work = Work(S.size - SRow.MEMORY, R.size, dense, rows)
     work.S[:], work.R[:] = S, R
-    work.over(np.array([S[State.T], R[Given.T_END]]), np.zeros((0, 1)))
+    work.over(np.array([S[SRow.T], R[Given.T_END]]), np.zeros((0, 1)))
     work.loop.h_min = h_min
     records, made, stop = runner.march(work, attempts)
     S[:] = work.S
@@ -307,7 +307,7 @@ def test_records_are_a_chain_from_start_to_end(backend: str) -> None:
     assert (t1[:-1] == t0[1:]).all()
     assert (y1[:-1] == y0[1:]).all()
     assert y0[0].tolist() == [1.0, 1.0]
-    assert y1[-1].tolist() == S[State.MEMORY :].tolist()
+    assert y1[-1].tolist() == S[SRow.MEMORY :].tolist()
     assert y1 == pytest.approx(np.array([smooth_ode().exact(t) for t in t1]), rel=1e-6)
     before = S.copy()
     records, made, stop = marched(runner, S, data(2, 1.0), 9, 9, 0.0)

@@ -16,7 +16,7 @@ from hybrid import ball
 from numpy.testing import assert_allclose
 
 import symfric as sf
-from symfric.bench.ocp_cases import Case
+from symfric.bench.ocp_cases import MoveCase
 from symfric.bench.ocp_referee import judged
 from symfric.foundation.numeric import Array
 from symfric.integrator.equations.inputs import input_data
@@ -223,7 +223,7 @@ def test_storms_are_shrinking_gaps_of_one_kind_and_crowds_of_any_kind() -> None:
 SEEDS = [*range(3), *(pytest.param(k, marks=pytest.mark.slow) for k in range(3, 20))]
 
 
-def machine(seed: int, share: float) -> tuple[Case, sf.Model, Array, Array]:
+def machine(seed: int, share: float) -> tuple[MoveCase, sf.Model, Array, Array]:
     """Chain of 1 to 4 blocks, each on the ground or on the block before it, and a random control.
 
     States are the positions and the sliding velocities s = G v. `share` is the ratio of both
@@ -246,7 +246,7 @@ def machine(seed: int, share: float) -> tuple[Case, sf.Model, Array, Array]:
         change = [sum(G[j, i] * force[i] / mass[i] for i in range(n)) for j in range(n)]
         return [*v, *change]
 
-    case = Case(
+    case = MoveCase(
         "machine", "", tuple(f"y{i}" for i in range(2 * n)), rate, tuple(range(n, 2 * n)),
         tuple((share * level, level) for level in sliding), (0.0,) * (2 * n), {}, 20.0, 1.5,
         normal=lambda m, x, u: [1.0] * n,

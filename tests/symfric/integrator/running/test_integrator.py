@@ -27,7 +27,7 @@ from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.methods.tableaux import METHODS
 from symfric.integrator.running.crossings import cutting
 from symfric.integrator.running.integrator import REMEMBERED, Integrator, built, remember
-from symfric.integrator.running.record import Dense, Record, Run, hermite
+from symfric.integrator.running.record import Dense, Record, RunRecord, hermite
 from symfric.scenes import PendulumBox, SliderCrank
 
 
@@ -257,15 +257,15 @@ def test_outputs_are_the_dense_output_whether_or_not_steps_are_kept(
     case: str, backend: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """`at` evaluates the records of accepted steps in NumPy; a long run is run again for it."""
-    whole, kept, keep = run_of(case, backend), list[int](), Run.keep
+    whole, kept, keep = run_of(case, backend), list[int](), RunRecord.keep
     assert whole.t.tolist() == [time for time in TIMES if time <= whole.step_times[-1]]
     assert whole.t.size > 1
 
-    def counted(self: Run, piece: Any) -> None:
+    def counted(self: RunRecord, piece: Any) -> None:
         keep(self, piece)
         kept.append(sum(map(len, self.kept)))
 
-    monkeypatch.setattr(Run, "keep", counted)
+    monkeypatch.setattr(RunRecord, "keep", counted)
     monkeypatch.setattr(of_run, "MOST_BYTES", 200)
     bounded = run_of(case, backend)
     assert bounded.statistics.smallest_step == whole.statistics.smallest_step
