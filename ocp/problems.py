@@ -329,7 +329,8 @@ def alp_rider() -> Problem:
     square = a**2 + b**2 + c**2 + d**2
     outputs = {"clearance": Output(square - alps, "1")}
     rider = Model("alp_rider", x=tuple(y), u=tuple(u), t=t, ode=ode, outputs=outputs)
-    ride = Phase(rider, 20.0, end={"y1": 2.0, "y2": 3.0, "y3": 1.0, "y4": -2.0})
+    end = {"y1": 2.0, "y2": 3.0, "y3": 1.0, "y4": -2.0}
+    ride = Phase(rider, 20.0, end=end, inputs={"u1": "linear", "u2": "linear"})
     cost = integral(
         lambda s: 100.0 * (s.y1**2 + s.y2**2 + s.y3**2 + s.y4**2) + 0.01 * (s.u1**2 + s.u2**2)
     )
