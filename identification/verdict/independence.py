@@ -66,7 +66,7 @@ class Regressor(NamedTuple):
     kind: Kind = ""
 
 
-class Family(NamedTuple):
+class DependenceTest(NamedTuple):
     """Columns that test for one type of dependence.
 
     Attributes:
@@ -84,7 +84,9 @@ class Family(NamedTuple):
     noisy: bool = False
 
 
-def families(regressors: Sequence[Regressor], position: Count, basis: Array) -> Iterator[Family]:
+def families(
+    regressors: Sequence[Regressor], position: Count, basis: Array
+) -> Iterator[DependenceTest]:
     """Yield the families of all `regressors`, with fewer columns if there are few rows.
 
     Args:
@@ -100,39 +102,43 @@ def families(regressors: Sequence[Regressor], position: Count, basis: Array) -> 
         if not np.ptp(signal) > 0:
             continue
         if kind == "time":
-            yield Family("the time", "parameters drift, or a temperature", basis * signal[:, None])
+            yield DependenceTest(
+                "the time", "parameters drift, or a temperature", basis * signal[:, None]
+            )
             continue
         if kind == "delay":
             hint = "the signals are recorded at different times: free={'dead_time': (0, 0.01)}"
-            yield Family("the rate of the signal", hint, signal[:, None])
+            yield DependenceTest("the rate of the signal", hint, signal[:, None])
             continue
         if kind == "force":
             y = signal / np.abs(signal).max()
             hint = "the gain of the sensor depends on direction or size, or friction on the load"
-            yield Family("the predicted force", hint, np.column_stack([np.abs(y), y**2, y**3]))
+            yield DependenceTest(
+                "the predicted force", hint, np.column_stack([np.abs(y), y**2, y**3])
+            )
             continue
         if kind == "position":
             way = next((np.sign(s) for _, s, k in regressors if k == "velocity"), None)
             hint = "an effect of the position is missing: ripple, cogging, a spring, gravity"
-            yield Family(f"the position {name}", hint, _waves(signal, way, n // 2))
+            yield DependenceTest(f"the position {name}", hint, _waves(signal, way, n // 2))
             continue
         columns = np.column_stack([lagged(signal, position, d) for d in delays])
         hint = f"dynamics or a delay from {name} is missing"
         smoothed, what = kind == "acceleration", f"the present and past of {name}"
-        yield Family(what, hint, columns, smoothed, smoothed or kind == "velocity")
+        yield DependenceTest(what, hint, columns, smoothed, smoothed or kind == "velocity")
         if kind != "velocity":
             continue
         speed, size = np.abs(signal), np.abs(signal).max()
         way = np.where(speed > MOVING * size, np.sign(signal), 0.0)  # 0 at standstill
         powers = (way, signal * speed / size**2, (signal / size) ** 3, speed / size)
         hint = "the friction level or its dependence on the speed is wrong"
-        yield Family(f"the direction and size of {name}", hint, np.column_stack(powers))
+        yield DependenceTest(f"the direction and size of {name}", hint, np.column_stack(powers))
         hint = "the friction curve has another shape, such as a Stribeck peak"
-        yield Family(f"the speed {name}", hint, _bins(speed, way, bins))
+        yield DependenceTest(f"the speed {name}", hint, _bins(speed, way, bins))
         if position.any():
             columns = _bins(_since_reversal(signal, position), way, bins)
             hint = "hysteresis or pre-sliding is not modelled"
-            yield Family(f"the distance since {name} last changed its sign", hint, columns)
+            yield DependenceTest(f"the distance since {name} last changed its sign", hint, columns)
 
 
 class Waves(NamedTuple):
@@ -247,7 +253,7 @@ class Dependence(NamedTuple):
 
 def dependences(
     r: Array, J: Array, colour: Colour, regressors: Sequence[Regressor], position: Count
-) -> Iterator[tuple[Family, Dependence]]:
+) -> Iterator[tuple[DependenceTest, Dependence]]:
     """Test the residuals against every family of `regressors`.
 
     Args:

@@ -35,7 +35,7 @@ from identification.verdict.covariance import FAR, Levels
 from identification.verdict.independence import (
     FORCES,
     Dependence,
-    Family,
+    DependenceTest,
     dependences,
     inputs_of,
     resolution,
@@ -156,7 +156,7 @@ def judge(
     """
     white = dict[str, Whiteness]()
     tests, effective = list[Test](), dict[str, float]()
-    each = list[tuple[Channel, list[tuple[Family, Dependence]]]]()
+    each = list[tuple[Channel, list[tuple[DependenceTest, Dependence]]]]()
     for channel, colour in zip(found.channels, found.colours, strict=True):
         name = found.label(channel)
         effective[name] = colour.effective
@@ -201,7 +201,7 @@ def _white(name: str, found: Whiteness, colour: Colour) -> Test:
 
 
 def _independent(
-    found: Minimum, channel: Channel, some: list[tuple[Family, Dependence]], limit: float
+    found: Minimum, channel: Channel, some: list[tuple[DependenceTest, Dependence]], limit: float
 ) -> Iterator[Test]:
     """Yield one test for each family; effects below the resolution or with a small share pass."""
     name, unit, r = found.label(channel), channel.unit, found.r[channel.rows]

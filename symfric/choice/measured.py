@@ -130,7 +130,7 @@ ROUNDS, PATIENCE = 5, 0.2
 
 @final
 @dataclass(frozen=True, eq=False)
-class Task:
+class Requirements:
     """Requirements that apply to all laws.
 
     Attributes:
@@ -165,7 +165,7 @@ class Task:
         return Wanted(self.accuracy, self.control if self.fixed else 0.0)
 
 
-def best_form(task: Task, name: str, laws: Sequence[Law]) -> RankedLaw:
+def best_form(task: Requirements, name: str, laws: Sequence[Law]) -> RankedLaw:
     """Return the row of the first ranked form of a law, or of its best form if none is ranked.
 
     If a form lacks a required phenomenon, the other forms lack it as well and are not measured.
@@ -178,7 +178,7 @@ def best_form(task: Task, name: str, laws: Sequence[Law]) -> RankedLaw:
     return min(rows, key=place)
 
 
-def measured(task: Task, name: str, law: Law) -> RankedLaw:
+def measured(task: Requirements, name: str, law: Law) -> RankedLaw:
     """Return the row of `law`; errors of the law or of the machine become the reason."""
     known, hard = nature.physical(law)
     operations, why = nature.c_operations(law)
@@ -218,7 +218,7 @@ def measured(task: Task, name: str, law: Law) -> RankedLaw:
     return _by_data(task.misfits, row)
 
 
-def _from_own(task: Task, held: Candidate, runs: Budget) -> Task:
+def _from_own(task: Requirements, held: Candidate, runs: Budget) -> Requirements:
     """Return the task with a fine run of the law as the reference if the reference is `OWN`."""
     if task.reference is not OWN:
         return task
@@ -239,7 +239,7 @@ def _by_data(misfits: dict[str, float] | None, row: RankedLaw) -> RankedLaw:
 
 
 def _placed(
-    task: Task, held: Candidate, levels: SmoothingStudy, runs: Budget, row: RankedLaw
+    task: Requirements, held: Candidate, levels: SmoothingStudy, runs: Budget, row: RankedLaw
 ) -> RankedLaw:
     """Return the row with the measurements and the standing.
 
@@ -270,7 +270,7 @@ def _placed(
     return replace(row, standing=INACCURATE, reason=f"{row.error:.1e} off: {why}")
 
 
-def _judged(task: Task, levels: SmoothingStudy, runs: Budget) -> AtEqualError:
+def _judged(task: Requirements, levels: SmoothingStudy, runs: Budget) -> AtEqualError:
     """Return the run at equal error from the reference, or at equal own error if there is none.
 
     Raises:
@@ -290,7 +290,7 @@ def _judged(task: Task, levels: SmoothingStudy, runs: Budget) -> AtEqualError:
     return at_equal_error(runs, near.s, task.reference, task.goal, near, whole=False)
 
 
-def _holds(task: Task, at: AtEqualError, runs: Budget) -> bool:
+def _holds(task: Requirements, at: AtEqualError, runs: Budget) -> bool:
     """Return True if a run at a much tighter tolerance satisfies the accuracy as well.
 
     Runs of stiff bristles may fail this test because of rounding errors.
@@ -313,7 +313,7 @@ def _own_numbers(law: Law) -> dict[str, float]:
     return {n: value for n, value in values.items() if value != starts.get(n, inf)}
 
 
-def _timed(task: Task, law: Law, at: AtEqualError, runs: Budget) -> float:
+def _timed(task: Requirements, law: Law, at: AtEqualError, runs: Budget) -> float:
     """Return the shortest processor time [s] of several calls, without building the integrator."""
     best, began = inf, process_time()
     for _ in range(ROUNDS):
@@ -324,7 +324,9 @@ def _timed(task: Task, law: Law, at: AtEqualError, runs: Budget) -> float:
     return best
 
 
-def _stepped(task: Task, held: Candidate, levels: SmoothingStudy, row: RankedLaw) -> RankedLaw:
+def _stepped(
+    task: Requirements, held: Candidate, levels: SmoothingStudy, row: RankedLaw
+) -> RankedLaw:
     """Return the row with the largest fixed steps, for the law as smooth as `control` allows.
 
     If the law does not satisfy `control` at any smoothing, the smoothing of `row` is used.

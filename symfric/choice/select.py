@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, final
 from symfric.choice.continuation import RUN
 from symfric.choice.friction import Friction
 from symfric.choice.machine import FAILURES, OWN, frictions_of, load_of, reference_of
-from symfric.choice.measured import Task, best_form
+from symfric.choice.measured import Requirements, best_form
 from symfric.choice.nature import forms, needed
 from symfric.choice.ranking import FAILED, RankedLaw, Ranking, lines, ordered
 from symfric.figures.regularisation import Measure, machine_of
@@ -210,7 +210,7 @@ def select(
         compared, about = OWN, "the data that they were fitted to"
     of_data = data is not None or misfits is not None
     fitted = of_data if fitted is None else checks.flag(f"{where}: fitted", fitted)
-    task = Task(
+    task = Requirements(
         machine, compared, words, frictions, load, accuracy, control, fitted,
         checks.flag(f"{where}: fixed_steps", fixed_steps), max(1, round(effort * RUN)), misfits,
     )  # fmt: skip
@@ -251,7 +251,7 @@ def laws_of(where: str, laws: Candidates | None) -> Forms:
     return found
 
 
-def _rows(task: Task, laws: Forms, workers: int) -> Iterator[RankedLaw]:
+def _rows(task: Requirements, laws: Forms, workers: int) -> Iterator[RankedLaw]:
     """Yield the rows; with several workers each law has a process, and rows come as they finish.
 
     The processes are forked, since functions defined in a user's file cannot be sent.

@@ -17,7 +17,7 @@ import casadi as ca
 from symfric.emitter.c99 import FORMS, FUNCTIONS, Real, Writer, operation_name
 from symfric.emitter.logic import LOWERED, logical, settled, simplified
 from symfric.emitter.statements import (
-    Branch,
+    IfStatement,
     LocalConstant,
     Side,
     Statement,
@@ -168,7 +168,7 @@ class _Body:
         """Return the nodes that must be loaded before a statement of a region."""
         places, taken = self.plan.placed.place, self.plan.takes[statement]
         stores: list[object] = [statement]
-        if isinstance(statement, Branch):
+        if isinstance(statement, IfStatement):
             stores = [self.plan.goals.get(i) for i in statement.selects]
         written = {
             self.targets[store.result][store.row].partition(" ")[0]
@@ -189,7 +189,7 @@ class _Body:
                 text = write.expression(node).text
                 words = self.real.declared(write.logical[node], constant=True)
                 return [f"{words} {self._name(node)} = {text};"]
-            case Branch():
+            case IfStatement():
                 return self._branch(statement)
             case Side(select, side):
                 value, goal = nodes[select].args[side], self._goal(select)
@@ -215,7 +215,7 @@ class _Body:
         shown = (self.writer.truth if store.result in self.truths else self.writer.number)(value)
         return self.targets[store.result][store.row].format(shown.text)
 
-    def _branch(self, branch: Branch) -> list[str]:
+    def _branch(self, branch: IfStatement) -> list[str]:
         placed, write = self.plan.placed, self.writer
         own = [i for i in branch.selects if i not in self.plan.goals]
         lines = [f"{self.real.declared(write.logical[i])} {self._name(i)};" for i in own]

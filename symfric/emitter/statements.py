@@ -79,7 +79,7 @@ class LocalConstant:
 
 @final
 @dataclass(frozen=True)
-class Branch:
+class IfStatement:
     """`if` statement for the selects with the label `label` in `region`."""
 
     region: int
@@ -105,7 +105,7 @@ class StoreStatement:
     row: int
 
 
-Statement = LocalConstant | Branch | Side | StoreStatement
+Statement = LocalConstant | IfStatement | Side | StoreStatement
 
 
 @final
@@ -142,7 +142,7 @@ class StatementPlan:
         groups = defaultdict[tuple[int, int], list[int]](list)
         for i, label in sorted(found.labels.items()):
             groups[found.place[i], label].append(i)
-        self.branches = {key: Branch(*key, tuple(selects)) for key, selects in groups.items()}
+        self.branches = {key: IfStatement(*key, tuple(selects)) for key, selects in groups.items()}
         uses = Counter[int]()
         for i, times in self._written():
             uses[i] += times
@@ -161,7 +161,7 @@ class StatementPlan:
         early = [s for s in statements if s not in last]
         order = ordered([self.takes[s] for s in early], [_made(s) for s in early])
         left = (early[k] for k in {*range(len(early))}.difference(order))
-        self.waiting.update(i for s in left if isinstance(s, Branch) for i in s.selects)
+        self.waiting.update(i for s in left if isinstance(s, IfStatement) for i in s.selects)
         return [*(early[k] for k in order), *last]
 
     def _written(self) -> Iterator[tuple[int, int]]:
@@ -209,7 +209,7 @@ class StatementPlan:
 
     def _collect(self) -> None:
         """Collect all statements by region, in the order of the graph."""
-        found, done = self.placed, set[Branch]()
+        found, done = self.placed, set[IfStatement]()
         for i, node in enumerate(self.nodes):
             if i in self.locals:
                 self.items[found.place[i]].append(LocalConstant(i))
@@ -254,7 +254,7 @@ class StatementPlan:
         match statement:
             case LocalConstant(node):
                 return self.nodes[node].args
-            case Branch(selects=selects):
+            case IfStatement(selects=selects):
                 return self.nodes[selects[0]].args[:1]
             case Side(select, side):
                 return (self.nodes[select].args[side],)
@@ -275,7 +275,7 @@ class StatementPlan:
         while region != self.placed.place[i]:
             outer = self.placed.regions[region]
             inner, at, region = at, self.branches[outer.parent, outer.label], outer.parent
-        if isinstance(at, Branch) and i in at.selects and at is not statement:
+        if isinstance(at, IfStatement) and i in at.selects and at is not statement:
             at = inner
         self.takes.setdefault(at, set()).add(i)
 
@@ -298,7 +298,7 @@ def _made(statement: Statement) -> tuple[int, ...]:
     match statement:
         case LocalConstant(node):
             return (node,)
-        case Branch(selects=selects):
+        case IfStatement(selects=selects):
             return selects
         case Side(select):
             return (select,)

@@ -28,7 +28,7 @@ from scipy.integrate import solve_ivp
 from symfric import ALL_LAWS, BrownMcPhee, Law, Model, SolveError, simulate
 from symfric.choice.friction import Friction
 from symfric.choice.machine import OWN
-from symfric.choice.measured import Task, measured
+from symfric.choice.measured import Requirements, measured
 from symfric.choice.ranking import WIDTH, RankedLaw
 from symfric.figures.regularisation import Machine, machine_of
 from symfric.foundation import checks
@@ -229,7 +229,7 @@ def _row(machine: Machine, name: str, first: bool) -> PaperRow:
 
 def _measured(machine: Machine, name: str, law: Law, T: float, S: float) -> PaperRow:
     model = machine.model(law)
-    task = Task(
+    task = Requirements(
         machine, OWN, (), {"": Friction()}, None, EQUAL, 0.05, own=True, fixed=True, work=WORK,
     )  # fmt: skip
     row: RankedLaw = measured(task, name, law)
