@@ -112,7 +112,7 @@ def test_belts_and_springs_of_joints_are_drawn_between_their_joints() -> None:
         lambda: chain(2).schematic(),
         pytest.param(lambda: chain(16).schematic(), id="chain of 16"),
         lambda: DrillString(LAW, lumps=1).schematic(),
-        lambda: DrillString(LAW, lumps=16).schematic(),
+        pytest.param(lambda: DrillString(LAW, lumps=16).schematic(), marks=pytest.mark.slow),
         lambda: FourBar(LAW, crank=1.0, coupler=30.0, rocker=25.0, base=28.0).schematic(),
         lambda: Rabinowicz(LAW, k=1e6, m=0.01).schematic(),
         lambda: Drive(LAW, turning=True).schematic(),
