@@ -186,6 +186,8 @@ BETTER = 0.88
 """Largest ratio of the unexplained parts with and without a delay that is reported."""
 WORSE = 1.05
 """Smallest such ratio that the opposite delay must have."""
+RESOLVED = 0.2
+"""Least reported delay relative to the standard deviation of the smoothing window."""
 LINE = 0.45
 """Share of one spectral line in the power of the residuals above which it is a hum."""
 LOUD = 0.02
@@ -229,7 +231,8 @@ def _dead_time(view: View, model: Rough, free: Rough) -> Iterator[Finding]:
 
     left = {lag: unexplained(lag) for lag in LAGS}
     best = min(left, key=lambda lag: left[lag])
-    if not (left[best] < BETTER and left[-best] > WORSE and abs(best) > 1):
+    found = left[best] < BETTER and left[-best] > WORSE
+    if not found or abs(best) <= max(1, RESOLVED * free.width):
         return
     k = LAGS.index(best)
     best = min(range(LAGS[max(k - 1, 0)], LAGS[min(k + 1, len(LAGS) - 1)] + 1), key=unexplained)

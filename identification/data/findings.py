@@ -225,7 +225,7 @@ class Rough:
 
     Attributes:
         t, v, a, force: times [s] and smoothed signals of the rows.
-        step: sample interval [s].
+        width, step: standard deviation of the smoothing window [samples], sample interval [s].
         blocks: number of blocks of equal length that contain the rows.
         columns: regressors of the values.
         clean: True if the acceleration exceeds its noise.
@@ -240,7 +240,7 @@ class Rough:
         step: float, clean: bool, blocks: int,
     ) -> None:  # fmt: skip
         self.t, self.v, self.a, self.force, self.columns = t, v, a, force, columns
-        self.step, self.clean, self.blocks = step, clean, blocks
+        self.width, self.step, self.clean, self.blocks = width, step, clean, blocks
         self.every = max(1, int(2 * width), force.size // ENOUGH)
         A, b = columns[:: self.every], force[:: self.every]
         self.values, self.errors, self.root = robust(A, b)

@@ -63,9 +63,9 @@ def test_sensors(seed: int) -> None:
     data = synthetic_drive_data(seed=seed, speeds=speeds, force_noise=5.0, position_noise=1e-6)
     silent(data, "resolution")
     t, x, force = (data[0][key] for key in ("t", "x", "force"))
-    count, volt = 10.0 ** (-seed - 3), 10.0 ** (1 - seed)
-    coarse = {"x": count * np.round(x / count), "force": volt * np.round(force / volt)}
-    silent(Dataset.of(t=t, **coarse), "resolution", "excitation")
+    for count, volt in ((10.0 ** (-seed - 3), 10.0 ** (1 - seed)), (1e-4, 1.0)):
+        coarse = {"x": count * np.round(x / count), "force": volt * np.round(force / volt)}
+        silent(Dataset.of(t=t, **coarse), "resolution", "excitation")
     silent(synthetic_drive_data(seed=seed, speeds=speeds, turning=True))
 
 
