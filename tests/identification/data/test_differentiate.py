@@ -86,7 +86,7 @@ def test_bandwidth_is_the_frequency_that_carries_the_force_not_its_noise() -> No
     t = np.arange(10_000) * 1e-3
     force = np.sin(2 * np.pi * 3 * t) + 0.2 * np.sin(2 * np.pi * 17 * t)
     noisy = force + 0.3 * np.random.default_rng(0).standard_normal(t.size)
-    assert bandwidth(force, 1e-3) == pytest.approx(17.0, abs=0.1)
+    assert bandwidth(5.0 + force, 1e-3) == pytest.approx(17.0, abs=0.1)
     assert bandwidth(noisy, 1e-3) == pytest.approx(17.0, abs=3.0)
 
 

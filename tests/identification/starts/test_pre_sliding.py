@@ -22,8 +22,8 @@ def dahl(x: np.ndarray, sigma_0: float, level: float) -> np.ndarray:
 
 
 def test_turning_points_ignore_what_is_within_the_dead_band() -> None:
-    x = np.array([0.0, 1.0, 0.95, 2.0, 1.0, 1.02, 0.0, 1.0])
-    assert turning_points(x, 0.1) == [3, 6]
+    x = np.array([0.0, 0.5, 1.0, 0.95, 2.0, 1.5, 1.0, 1.02, 0.0, 1.0])
+    assert turning_points(x, 0.1) == [4, 8]
 
 
 def test_stiffness_of_a_bristle_and_of_an_elastic_element_with_noise() -> None:

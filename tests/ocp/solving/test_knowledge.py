@@ -102,7 +102,9 @@ def mechanism(x: float = 0.0, phi: float = 0.0, T: float = 1.5) -> Problem:
     force = made.input("f", "N", nominal=1.0)
     made.force(JointSpringDamper("motor", "x", actuator=force))
     rest = {"x": 0.0, "phi": 0.0, "x_rate": 0.0, "phi_rate": 0.0}
-    phase = Phase(made.build(), T, start=rest | {"x": x, "phi": phi}, end=rest | {"x": 0.5})
+    phase = Phase(
+        made.build(), T, start=rest | {"x": x, "phi": phi}, end=rest | {"x": 0.5, "phi": 0.1}
+    )
     return Problem(phase, integral(lambda s: s.f**2))
 
 

@@ -22,7 +22,7 @@ from fake_cupy import LAUNCH_ON_HOST, ON_HOST, FakeCupy
 from symfric import BrownMcPhee, Law, LuGre, Model, Status, rabinowicz, simulate_many
 from symfric.emitter.c99 import DOUBLE, REALS
 from symfric.integrator.cuda.device import BLOCK, Device, DeviceError, Kernel, kernel_of
-from symfric.integrator.cuda.on_device import OnDevice
+from symfric.integrator.cuda.on_device import OnDevice, member_bytes
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.methods.tableaux import METHODS
 from symfric.integrator.running.integrator import Integrator
@@ -158,6 +158,8 @@ def test_the_size_of_a_chunk_depends_on_its_work_and_its_results() -> None:
         task.kernel = replace(kernel, real=REALS[real])
         task.job = replace(task.job, times=np.broadcast_to(1.0, (times,)))
         assert task.chunk(SimpleNamespace(own={})) == size  # type: ignore[arg-type]
+    stretch: Any = SimpleNamespace(times=np.zeros((1, 3)), data=np.zeros((1, 5)))
+    assert member_bytes(kernel, stretch) == 8 * (7 + 5 + 2 * 2 + 3 * 4) + 8 * 4 + 4 * 4
 
 
 def test_the_device_of_cupy(cupy: FakeCupy, monkeypatch: pytest.MonkeyPatch) -> None:

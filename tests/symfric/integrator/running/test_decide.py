@@ -1,5 +1,7 @@
 """Modes of several contacts decided in compiled code: the bits of the decision in Python."""
 
+from ctypes import c_double, c_int
+from pathlib import Path
 from typing import Any
 
 import casadi as ca
@@ -8,7 +10,9 @@ import pytest
 from backends import bits, needs_compiler
 
 import symfric as sf
-from symfric.integrator.running.contact_modes import ContactModes
+from symfric.integrator.compiled.compiler import load
+from symfric.integrator.running import contact_modes
+from symfric.integrator.running.contact_modes import TURNING, ContactModes
 from symfric.model import Model
 from symfric.scenes import Arm, DoublePendulum
 
@@ -91,3 +95,29 @@ def test_compiled_code_decides_as_python_does(name: str, monkeypatch: pytest.Mon
         in_python += len(calls)
         assert bits(runs[0]) == bits(runs[1])
     assert in_python <= len(cases) // 4  # those for which all combinations are tried
+
+
+@needs_compiler
+def test_objections_of_compiled_code_are_those_of_python() -> None:
+    """Of three contacts, of which several are inconsistent, some equally."""
+    text = Path(contact_modes.__file__).with_name("decide.c").read_text("utf-8")
+    names, begin = text.index("enum { UP"), text.index("static int symfric_objection")
+    body = text[begin : text.index("/* Decides")].replace("$turning", repr(TURNING))
+    head = (
+        f"#include <math.h>\nenum {{ CONTACTS = 3 }};\n{text[names : text.index(chr(10), names)]}"
+    )
+    object_to = load(
+        f"{head}\n{body.replace('static ', '')}", "symfric_objection"
+    ).symfric_objection
+    rng, several = np.random.default_rng(0), 0
+    for _ in range(2000):
+        modes, free = rng.integers(-1, 2, 3).astype(float), rng.integers(0, 2, 3)
+        rows = rng.choice([-2.0, -1.0, -1e-9, 0.0, 0.5, 1.0], (3, 4)) * rng.choice([1.0, 30.0])
+        expected = ContactModes._objection(None, modes, free, rows)  # type: ignore[arg-type]
+        better = (c_double * 3)(*modes)
+        changed = object_to(better, (c_int * 3)(*free), (c_double * 12)(*rows.ravel()))
+        assert changed == (expected is not None)
+        if expected is not None:
+            modes[expected[0]], several = expected[1], several + 1
+        assert [*better] == modes.tolist()
+    assert 1000 < several < 2000
