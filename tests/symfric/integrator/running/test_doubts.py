@@ -191,7 +191,7 @@ def test_laws_are_not_inserted_for_friction_that_only_brakes(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     asked = list[str]()
-    monkeypatch.setattr(doubts, "by_laws", lambda model: asked.append(model.name))
+    monkeypatch.setattr(doubts, "by_laws", lambda model, _: asked.append(model.name))
     sf.simulate(ALL_SCENES["arm"](sf.LuGre()).model(), 1e-3, backend="vm", samples=2)
     assert asked == []
 
