@@ -112,7 +112,7 @@ class BoundaryEquations(Curve):
         return found.real / abs(found) if self.hopf else found.real * float(self.scale[-1])
 
     def at(self, z: Array) -> Node:
-        """Return the linearised equations; see `Curve.at`."""
+        """Return the linearised equations; see `CurveEquations.at`."""
         node = self.rest.at(z)
         row = [
             (self.growth(z + a * e) - self.growth(z - a * e)) / (2 * a)

@@ -107,7 +107,7 @@ class Orbits(Family):
     Attributes:
         problem: shooting equations with the derivatives by the parameter.
         p: values of all free parameters.
-        scale, tolerance: see `Curve`.
+        scale, tolerance: see `CurveEquations`.
         section: a state and the rate there: the start of each orbit is in the plane through the
             state that is orthogonal to the rate. By default, the phase is that of the prediction.
     """
@@ -124,7 +124,7 @@ class Orbits(Family):
         return self.problem.names[0]
 
     def at(self, z: Array) -> Node:
-        """Return the linearised shooting equations; see `Curve.at`."""
+        """Return the linearised shooting equations; see `CurveEquations.at`."""
         nx = z.size - 2
         if not z[nx] > 0:
             raise ValueError("the period falls to zero")
@@ -150,7 +150,7 @@ class Orbits(Family):
         return Node(z, np.concatenate(rows), np.vstack(slopes), every, D, found)
 
     def anchored(self, node: Node) -> tuple[Self, Node]:
-        """Return the equations with a section that the orbit of `node` crosses; see `Curve`."""
+        """Return the equations with a section that the orbit of `node` crosses; see `CurveEquations`."""
         if self.problem.driven:
             return self, node
         part, size = node.content.segments[0], self.problem.scale
@@ -219,7 +219,7 @@ class Equilibria(Family):
         eq: equations of the model.
         d: inputs and parameters.
         free: indices of the free parameters in d.
-        scale, tolerance: see `Curve`.
+        scale, tolerance: see `CurveEquations`.
     """
 
     eq: ModelEquations
@@ -229,7 +229,7 @@ class Equilibria(Family):
     tolerance: float
 
     def at(self, z: Array) -> Node:
-        """Return the linearised equations of an equilibrium; see `Curve.at`."""
+        """Return the linearised equations of an equilibrium; see `CurveEquations.at`."""
         if self.turns(z):
             raise ValueError("a sliding contact comes to rest")
         y, d = self.split(z)
