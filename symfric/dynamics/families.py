@@ -150,7 +150,7 @@ class Orbits(Family):
         return Node(z, np.concatenate(rows), np.vstack(slopes), every, D, found)
 
     def anchored(self, node: Node) -> tuple[Self, Node]:
-        """Return the equations with a section that the orbit of `node` crosses; see `CurveEquations`."""
+        """Return the equations with a section that the orbit of `node` crosses."""
         if self.problem.driven:
             return self, node
         part, size = node.content.segments[0], self.problem.scale
