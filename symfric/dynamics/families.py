@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from symfric.dynamics.balance import rows_at_rest
 from symfric.dynamics.branch import Special
-from symfric.dynamics.curve import ContinuationStep, Node, located
-from symfric.dynamics.curve import CurveEquations as Curve
+from symfric.dynamics.curve import ContinuationStep, CurveEquations, Node, located
 from symfric.dynamics.equations import ModelEquations, tangent
 from symfric.dynamics.shooting import LinearisedShooting, OrbitShooting
 from symfric.foundation.numeric import Array
@@ -49,7 +48,7 @@ def sequence(node: Node) -> str:
     return ""
 
 
-class Family(Curve):
+class Family(CurveEquations):
     """Equations of a family over one parameter, and the deviations from its members."""
 
     @abstractmethod
