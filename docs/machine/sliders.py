@@ -101,7 +101,7 @@ def loop(law: Law) -> Model:
 
 
 def _stretch(law: Law) -> float:
-    """Return the pre-sliding distance, or else the distance of a second at the Stribeck velocity [m]."""
+    """Return the pre-sliding distance, or else that of a second at the Stribeck velocity [m]."""
     found = scales(law)
     return found.stretch if isfinite(found.stretch) else found.velocity
 
