@@ -137,17 +137,18 @@ def _gains(
     sliding: Sliding, integrator: Integrator, inputs: InputData, run: RunRecord, p: Array
 ) -> Iterator[str]:
     """Yield a message about a contact whose friction adds energy to the motion."""
-    (t, y), contact = run.seen, sliding.contact
+    (t, y), contact, memory = run.seen, sliding.contact, integrator.model.memory
     name, unit = f"sliding '{contact.name}'", contact.unit
 
     def slip_and_forces() -> list[Any]:
         steady = _steady(contact, contact.slip, contact.N, contact.given)
         return [contact.slip, contact.friction, steady]
 
-    rows = _determined(integrator.model, slip_and_forces)
-    if rows is None:
+    if name not in memory:
+        memory[name] = _determined(integrator.model, slip_and_forces)
+    if memory[name] is None:
         return
-    slip, force, steady = _over_time(integrator, inputs, name, rows, t, y, p)
+    slip, force, steady = _over_time(integrator, inputs, name, memory[name], t, y, p)
     power, worst = force * slip, int(np.argmin(steady * slip))
     work, turnover = (np.diff(t) @ (w[1:] + w[:-1]) / 2 for w in (power, np.abs(power)))
     if steady[worst] * slip[worst] < 0 and work < -SHARE * turnover:

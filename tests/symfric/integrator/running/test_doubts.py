@@ -196,6 +196,14 @@ def test_laws_are_not_inserted_for_friction_that_only_brakes(
     assert asked == []
 
 
+def test_a_second_run_derives_no_friction_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    model = Rabinowicz(Pushing()).model()
+    for _ in range(2):
+        with pytest.warns(sf.EnergyWarning):
+            sf.simulate(model, 2.0, samples=2)
+        monkeypatch.setattr(doubts, "_determined", None)
+
+
 def test_bristles_that_return_stored_energy_are_not_reported() -> None:
     """A block at rest on stretched bristles: at first friction does nothing but push it."""
     with warnings.catch_warnings():
