@@ -179,8 +179,9 @@ def estimate(
 
     Limits: the method finds a local minimum; `unconverged` counts the samples at which it does not
     converge. Deviations contain the mean square of the error of the linearised model. Bristles
-    that start to slip within a deviation have larger errors: with LuGre, 90 % of the errors of z
-    are within two deviations, single ones reach a hundred.
+    that start to slip within a deviation have larger errors. In sliding, the deviation of z tends
+    to zero, below integration errors: with LuGre (axis of the how-to guide), 83 to 87 % of the
+    errors of z are within two deviations; single errors, below 1e-12 m, reach 5e4 of them.
     """
     check_model("estimate", model)
     step = checks.number("estimate: step", step, above=0.0)
@@ -211,7 +212,7 @@ def estimate(
     first = np.nan_to_num(first) / scale  # states of laws have no start
     walk = np.array([noise.get(v.name, 0.0) for v in states]) / scale
     loads = states[len(model.x) :]
-    machine = HorizonFunctions(
+    functions = HorizonFunctions(
         *_functions(model, loads, measured, step, steps),
         fixed=(scale, np.array([*values.values()], dtype=float)),
         Q=np.diag(walk**2 * step),
@@ -221,7 +222,7 @@ def estimate(
     )
     y = np.array([rows[name] for name in measured])
     u = np.array([rows[v.name] for v in model.u if v.name in rows]).reshape(-1, y.shape[1])
-    return _moved(machine, y, u, first, horizon, states, scale, step)
+    return _moved(functions, y, u, first, horizon, states, scale, step)
 
 
 def _numbers(
@@ -292,7 +293,7 @@ def _functions(
 
 
 def _moved(
-    machine: HorizonFunctions, y: Array, u: Array, first: Array, horizon: int,
+    functions: HorizonFunctions, y: Array, u: Array, first: Array, horizon: int,
     states: Sequence[Variable], scale: Array, step: float,
 ) -> Estimate:  # fmt: skip
     """Move the horizon over all samples."""
@@ -302,7 +303,7 @@ def _moved(
     means, deviations = np.empty((first.size, count)), np.empty((first.size, count))
     errors, innovations = np.zeros((count, first.size, first.size)), np.empty(count)
     still = 0.0 * first[:, None]
-    window = Window(machine, y[:, :1], u[:, :1], errors[:1], prior)
+    window = Window(functions, y[:, :1], u[:, :1], errors[:1], prior)
     found = window.solved(still)
     for k in range(count):
         if k:
@@ -311,18 +312,18 @@ def _moved(
             if k >= horizon:
                 prior, weights = found.predicted[1], weights[:, 1:]
                 weights[:, 0] = pinvh(prior[1]) @ (found.smooth[:, 1] - prior[0])
-                free = _grown(free, found.slopes[0], machine.Q)
+                free = _grown(free, found.slopes[0], functions.Q)
             here = slice(begin, k + 1)
-            window = Window(machine, y[:, here], u[:, here], errors[here], prior)
+            window = Window(functions, y[:, here], u[:, here], errors[here], prior)
             found = window.solved(weights)
         unconverged += not found.converged
-        means[:, k] = machine.inside(found.smooth)[:, -1]
+        means[:, k] = functions.inside(found.smooth)[:, -1]
         errors[k] = window.step_error(found)
         innovations[k] = found.innovations[-1]
         deviations[:, k] = np.sqrt(np.maximum(np.diag(found.filtered[-1]), 0.0))
     for slope in found.slopes[:-1]:
-        free = _grown(free, slope, machine.Q)
-    smooth = machine.inside(found.smooth) * scale[:, None]
+        free = _grown(free, slope, functions.Q)
+    smooth = functions.inside(found.smooth) * scale[:, None]
     return Estimate(
         t=step * np.arange(count),
         signals=dict(zip(names, means * scale[:, None], strict=True)),

@@ -102,13 +102,13 @@ class Window:
     """Data of a horizon.
 
     Attributes:
-        machine: model.
+        functions: functions and covariances of the model.
         y, u: measured signals (NaN if missing) and inputs in columns.
         errors: covariance of the error of the model in each step, added to its noise.
         prior: mean and covariance before the first sample.
     """
 
-    machine: HorizonFunctions
+    functions: HorizonFunctions
     y: Array
     u: Array
     errors: Array
@@ -123,7 +123,7 @@ class Window:
         xi, cost = self._motion(weights)
         if not np.isfinite(cost):
             raise SolveError(DIVERGED, Status.NOT_FINITE)
-        pins = xi != self.machine.inside(xi)
+        pins = xi != self.functions.inside(xi)
         found = self._passed(xi, pins)
         for _ in range(ITERATIONS):
             moved = self._searched(found.weights, weights, xi, cost, pins)
@@ -131,7 +131,7 @@ class Window:
                 break
             change = float(np.abs(moved[1] - xi).max())
             weights, xi, cost = moved
-            before, pins = pins, xi != self.machine.inside(xi)
+            before, pins = pins, xi != self.functions.inside(xi)
             if change <= TOLERANCE and np.array_equal(pins, before):
                 found = replace(found, converged=True)
                 break
@@ -151,13 +151,13 @@ class Window:
         for the covariance of the estimate m; the result is the mean of r_i r_i'. Source:
         Arasaratnam and Haykin, IEEE Trans. Autom. Control 54, 2009, 1254-1269.
         """
-        machine, m = self.machine, self.machine.inside(found.smooth)[:, -1:]
+        functions, m = self.functions, self.functions.inside(found.smooth)[:, -1:]
         n = m.size
         variances, axes = np.linalg.eigh(found.filtered[-1])
         shifts = axes * np.sqrt(n * np.maximum(variances, 0.0))
-        points = machine.inside(m + np.hstack([shifts, -shifts]))
-        (finer,) = machine.at(machine.finer, points, np.tile(self.u[:, -1:], 2 * n))
-        (linear,) = machine.at(machine.ahead, m, self.u[:, -1:])
+        points = functions.inside(m + np.hstack([shifts, -shifts]))
+        (finer,) = functions.at(functions.finer, points, np.tile(self.u[:, -1:], 2 * n))
+        (linear,) = functions.at(functions.ahead, m, self.u[:, -1:])
         errors = finer - linear - found.slopes[-1] @ (points - m)
         return errors @ errors.T / (2 * n)
 
@@ -165,7 +165,7 @@ class Window:
         self, goal: Array, weights: Array, xi: Array, cost: float, pins: NDArray[np.bool_]
     ) -> tuple[Array, Array, float] | None:
         """Return weights, motion and cost after a step towards `goal`; None if no step improves."""
-        limits = self.machine.inside(xi)
+        limits = self.functions.inside(xi)
         present = cost + _outside(xi, limits, pins)
         for halving in range(HALVINGS):
             trial = weights + 0.5**halving * (goal - weights)
@@ -177,16 +177,18 @@ class Window:
 
     def _motion(self, weights: Array) -> tuple[Array, float]:
         """Return the motion in columns with given weights of the noise, and its cost."""
-        machine, (mean, spread) = self.machine, self.prior
+        functions, (mean, spread) = self.functions, self.prior
         noise = [spread @ weights[:, 0]]
-        noise += [(machine.Q + e) @ w for e, w in zip(self.errors, weights[:, 1:].T, strict=False)]
+        noise += [
+            (functions.Q + e) @ w for e, w in zip(self.errors, weights[:, 1:].T, strict=False)
+        ]
         xi = [mean + noise[0]]
         for u, w in zip(self.u.T, noise[1:], strict=False):
-            xi.append(machine.ahead(xi[-1], u, *machine.fixed).full()[:, 0] + w)
+            xi.append(functions.ahead(xi[-1], u, *functions.fixed).full()[:, 0] + w)
         motion = np.array(xi).T
-        rest = self.y - machine.at(machine.seen, motion, self.u)[0]
+        rest = self.y - functions.at(functions.seen, motion, self.u)[0]
         cost = np.sum(weights.T * noise)
-        cost += np.sum(np.where(np.isnan(self.y), 0.0, rest**2 / machine.R[:, None]))
+        cost += np.sum(np.where(np.isnan(self.y), 0.0, rest**2 / functions.R[:, None]))
         return motion, float(cost) if np.isfinite(cost) else np.inf
 
     def _passed(self, xi: Array, pins: NDArray[np.bool_]) -> Found:
@@ -194,10 +196,10 @@ class Window:
 
         Values with `pins`, a mask of the shape of `xi`, are held at the nearest bound.
         """
-        machine, every, count = self.machine, np.eye(xi.shape[0]), xi.shape[1]
-        limits = machine.inside(xi)
-        after, slopes = machine.at(machine.after, xi, self.u)
-        seen, rows = machine.at(machine.seen, xi, self.u)
+        functions, every, count = self.functions, np.eye(xi.shape[0]), xi.shape[1]
+        limits = functions.inside(xi)
+        after, slopes = functions.at(functions.after, xi, self.u)
+        seen, rows = functions.at(functions.seen, xi, self.u)
         A, C = np.split(slopes, count, axis=1), np.split(rows, count, axis=1)
         predicted, means, covariances = [self.prior], list[Array](), list[Array]()
         innovations = list[float]()
@@ -205,7 +207,7 @@ class Window:
             m, spread = predicted[-1]
             there, pinned = np.isfinite(self.y[:, k]), pins[:, k]
             H = np.vstack([C[k][there], every[pinned]])
-            R = np.diag([*machine.R[there], *np.full(pinned.sum(), PINNED**2)])
+            R = np.diag([*functions.R[there], *np.full(pinned.sum(), PINNED**2)])
             S = H @ spread @ H.T + R
             gain = np.linalg.solve(S, H @ spread).T
             rest = [*(self.y[there, k] - seen[there, k]), *(limits[pinned, k] - xi[pinned, k])]
@@ -217,7 +219,7 @@ class Window:
             means.append(m)
             covariances.append(P)
             ahead = after[:, k] + A[k] @ (m - xi[:, k])
-            after_step = _symmetric(A[k] @ P @ A[k].T + machine.Q + self.errors[k])
+            after_step = _symmetric(A[k] @ P @ A[k].T + functions.Q + self.errors[k])
             predicted.append((ahead, after_step))
         return replace(_smoothed(means, covariances, predicted, A), innovations=innovations)
 

@@ -310,7 +310,8 @@ def alp_rider() -> Problem:
     |y|^2 >= 3 p(t, 3, 12) + 3 p(t, 6, 10) + 3 p(t, 10, 6) + 8 p(t, 15, 4) + 0.01,
     p(t, a, b) = exp(-b (t - a)^2);  J = integral of 100 |y|^2 + 0.01 |u|^2 over 20 s
 
-    Errors of a simulation grow by e^40 over 20 s, so an open-loop simulation misses the end.
+    The inputs are linear on intervals. Errors of a simulation grow by e^40 over 20 s, so an
+    open-loop simulation misses the end.
     """
     starts = (2.0, 1.0, 2.0, 1.0)
     y = [Variable(f"y{i + 1}", "1", start=start) for i, start in enumerate(starts)]

@@ -21,7 +21,7 @@ from symfric.multibody import (
     Universal,
 )
 from symfric.multibody.equations import Equations
-from symfric.multibody.prepare import Assembled
+from symfric.multibody.prepare import PreparedMechanism
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 in_both = pytest.mark.parametrize("formulation", ["joint", "absolute"])
@@ -68,7 +68,7 @@ def chain(reverse: bool = False, gravity: float = 9.81) -> Mechanism:
     return m
 
 
-def state(made: Assembled, seed: int = 0) -> tuple[Array, Array]:
+def state(made: PreparedMechanism, seed: int = 0) -> tuple[Array, Array]:
     """Random coordinates with Euler parameters of length one, and rates that keep it."""
     rng = np.random.default_rng(seed)
     q, qd = rng.normal(size=(2, made.eq.n)) * 0.7

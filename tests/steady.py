@@ -31,7 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from docs.machine.pages import ROOT, agrees, blocks, run, written_pages
-from symfric.integrator.methods.attempt import Given
+from symfric.integrator.methods.attempt import RRow
 
 SAFETY = 0.5
 """A value that moved by more than this share of what would change its last digit is reported."""
@@ -109,7 +109,7 @@ class _Listening(ast.NodeTransformer):
 @contextmanager
 def nudged(factor: float) -> Generator[None]:
     """Every simulation at tolerances that are `factor` times the requested ones."""
-    of, fill = Given.of, Given.fill
+    of, fill = RRow.of, RRow.fill
 
     def other(t_end: float, rtol: float, h_max: float, atol: Any, d: Any) -> NDArray[np.float64]:
         return of(t_end, rtol * factor, h_max, np.asarray(atol) * factor, d)
@@ -117,7 +117,7 @@ def nudged(factor: float) -> Generator[None]:
     def filled(R: Any, t_end: float, rtol: float, h_max: float, atol: Any, d: Any) -> None:
         fill(R, t_end, rtol * factor, h_max, atol * factor, d)
 
-    with patch.object(Given, "of", other), patch.object(Given, "fill", filled):
+    with patch.object(RRow, "of", other), patch.object(RRow, "fill", filled):
         yield
 
 

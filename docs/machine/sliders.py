@@ -46,6 +46,10 @@ SMALL = 1e-3
 """Largest relative error of a run, if one of `CHOICES` is that accurate."""
 PERIODS, FREQUENCY, STEPS = 2, 1.0, 2000
 """Periods of the sinusoidal motion, its frequency [Hz], and drawn points of each period."""
+PLAIN = ("level", "shape")
+"""Roles of parameters whose sliders are linear."""
+SLIDES = 3.0
+"""Time at which a block with a stiffer spring begins to slide [s]."""
 STEP = 1e-3
 """Time between drawn points of the block on the belt [s]."""
 SAID = TEXTS["sliders"]
@@ -97,24 +101,31 @@ def loop(law: Law) -> Model:
 
 
 def _stretch(law: Law) -> float:
-    """Return the pre-sliding distance, or else the way in a second at the Stribeck velocity [m]."""
+    """Return the pre-sliding distance, or else that of a second at the Stribeck velocity [m]."""
     found = scales(law)
     return found.stretch if isfinite(found.stretch) else found.velocity
 
 
+def block(law: Law) -> Rabinowicz:
+    """Return the block on the belt, with a stiffer spring if it would stick to the end of a run."""
+    usual = Rabinowicz(law)
+    slides = scales(law).static / (usual.k * usual.v_belt)  # time [s]
+    return usual if slides < usual.t_end else replace(usual, k=usual.k * slides / SLIDES)
+
+
 def belt(law: Law) -> Model:
-    """Return the model of `Rabinowicz` with the parameters m, k, v_belt and those of the law.
+    """Return the model of `block` with the parameters m, k, v_belt and those of the law.
 
     Raises:
         ValueError: the scene does not accept the law.
     """
-    scene = Rabinowicz(law)
+    scene = block(law)
     model = scene.model(name for name in parameters(scene) if name != "g")
     return replace(model, p=_numbered(model.p))
 
 
 def _numbered(given: Iterable[Variable]) -> tuple[Variable, ...]:
-    """Return variables with other names, since laws have parameters named h, t or N."""
+    """Return variables with other names, since `BoucWen` has a parameter A, as the motion has."""
     return tuple(replace(v, name=f"given_{k}") for k, v in enumerate(given))
 
 
@@ -124,7 +135,7 @@ class Run:
     """Run of a model by fixed steps in the browser.
 
     Attributes:
-        step: function (states, parameters with h, nothing) -> states and outputs after the step.
+        step: function (states, parameters and h, no inputs) -> states and outputs after the step.
         start: initial states.
         h: step [s].
         method: name of the method.
@@ -202,15 +213,11 @@ def slider(
     return about | {"value": value, "low": low, "high": high, "log": log}
 
 
-PLAIN = ("level", "shape")
-"""Roles of parameters whose sliders are linear."""
-
-
 def described(law: Law) -> dict[str, Any]:
     """Return what `sliders.js` needs to know about a law."""
     static, wide, known = scales(law).static, window(law, NORMAL_FORCE), parameters(law)
     viscous = {"N s/m": static / (5 * wide), "s/m": static / NORMAL_FORCE / (5 * wide)}
-    machine = parameters(Rabinowicz(law))
+    machine = parameters(block(law))
     moved = [
         (Variable("N", "N", lower=0.0, doc="normal force; on the belt it is m g"), NORMAL_FORCE),
         (Variable("A", "m", lower=0.0, doc="amplitude of the motion"), 3 * _stretch(law)),

@@ -4,6 +4,7 @@
   const root = document.querySelector('.sliders');
   const groups = { law: 'Parameters of the law', inputs: 'Further inputs', contact: 'Load and motion', belt: 'Block on the belt' };
   const all = Object.keys(groups).flatMap(group => about[group].map(item => ({ ...item, group })));
+  /** True for an item that changes a curve of this page. */
   const moves = item => item.group === 'belt' ? about.runs.belt : about.runs.loop || !['A', 'f'].includes(item.name);
   const values = new Map(all.map(item => [item.group + item.name, item.value]));
   const of = group => about[group].map(item => values.get(group + item.name));
@@ -126,14 +127,14 @@
     return repeated(belt, start, [...of('belt'), ...of('law'), h / parts], count, each);
   };
 
-  /** Largest difference of a column of two runs, relative to its peak. */
+  /** Largest difference of a column of two runs, relative to its peak; NaN if a number is not finite. */
   const difference = (rows, finer, column) => {
     let most = 0, peak = 0;
     for (let k = 0; k < rows.length; k += 1) {
       most = Math.max(most, Math.abs(rows[k][column] - finer[k][column]));
       peak = Math.max(peak, Math.abs(finer[k][column]));
     }
-    return most / peak;
+    return peak ? most / peak : most;
   };
 
   // ---- figures ----
@@ -189,9 +190,10 @@
       if (!about.runs[name]) continue;
       const rows = last[name], column = name === 'belt' ? 0 : rows[0].length - 1;
       const share = difference(rows, rowsOf(2), column);
-      const said = share <= 0.01 ? `changes the curve by ${digits(share, 2)} of the peak.`
-        : 'changes the curve visibly: do not rely on it, use symfric.';
-      figures[name].note.textContent = `${texts[name]()} Here, halving the step ${said}`;
+      const said = Number.isNaN(share) ? 'the steps do not stay finite: use symfric.'
+        : share <= 0.01 ? `halving the step changes the curve by ${digits(share, 2)} of the peak.`
+        : 'halving the step changes the curve visibly: do not rely on it, use symfric.';
+      figures[name].note.textContent = `${texts[name]()} Here, ${said}`;
     }
     root.dataset.compared = 'true';
   };

@@ -187,7 +187,7 @@ BETTER = 0.88
 WORSE = 1.05
 """Smallest such ratio that the opposite delay must have."""
 RESOLVED = 0.2
-"""Least reported delay relative to the standard deviation of the smoothing window."""
+"""Least of `LAGS` that is reported, relative to the standard deviation of the smoothing window."""
 LINE = 0.45
 """Share of one spectral line in the power of the residuals above which it is a hum."""
 LOUD = 0.02

@@ -182,7 +182,8 @@ class Dataset:
             roles: signals whose names differ from their part: `check(x="theta", force="tau_1")`.
 
         Limits: a wrong gain of the force, consistently wrong units, or a load that changed between
-        records are not detectable from the data alone.
+        records are not detectable from the data alone. Delays up to one sample, or up to a fifth of
+        the standard deviation of the window that smooths the position, are not reported.
         """
         return check(self.name, self.records, roles)
 

@@ -104,9 +104,8 @@ POINTS = 2000
 """Largest number of points of a line, about two for each column of pixels."""
 GAP = 3.0
 """Smallest gap in time, relative to the usual step."""
-LEAST = 300
-TOGETHER = 24_000
-"""Total number of points of one type of line; with many channels, each line has fewer points."""
+TOGETHER, LEAST = 24_000, 300
+"""Number of points of all lines of one type, which many channels share, and least for each."""
 SIDE = 300
 """Number of points of a curve in each direction, down to a millionth of the largest speed."""
 DOTS = 4000

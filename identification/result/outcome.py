@@ -1,4 +1,4 @@
-"""Fields of a fit and their report as text: verdict first, then estimates with uncertainty."""
+"""Fields of a fit and their report as text, with estimates also in the units of a drive."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -28,8 +28,6 @@ NOTHING = 1e8
 """Ratio of the interval ends above which a value is not identifiable."""
 MANY = 12
 """Largest number of start values, dead times and pairs that are listed."""
-
-
 ALONE = "m without rotor"
 """Name of the mass or inertia of the load alone."""
 AT_MOTOR = {

@@ -1,4 +1,4 @@
-"""Inverse dynamics of a robot as a function that is linear in its inertial parameters.
+"""Inverse dynamics of a robot, linear in its inertial parameters, and its URDF with new ones.
 
     tau = Y(q, q', q'') pi,   pi = (m, m c, J) of each body: ten numbers
 

@@ -1,4 +1,4 @@
-"""Least squares of the torques of a robot: ordinary, weighted by joint, or robust.
+"""Least squares of the torques of a robot, and the parameters that its records determine.
 
     tau_j = Y_j x + offset_j + F_j(q_j', theta_j),    weights 1 / sigma_j
 
@@ -6,9 +6,8 @@ sigma_j is the standard deviation of the residuals of joint j, which is estimate
 values (iteratively reweighted least squares). Nonlinear laws are linearised (Gauss and Newton). The
 covariance includes the autocorrelation of the residuals of each joint, see `Sandwich`.
 
-`information` states before the fit which parameters the records determine. With s the scale of
-each base parameter in the file and sigma the noise of the torques, a combination of singular
-value d in
+`information` states before the fit which parameters the records determine. With s the scale of each
+base parameter in the file and sigma the noise of the torques, a combination of singular value d in
 
     sigma^-1 Y_1 diag(s) = U D V',
 

@@ -10,8 +10,8 @@ signal s:
 Rows are reduced block by block to the triangle R of a QR factorisation (a sequential TSQR). Blocks
 are so small that BLAS uses only one thread, and the bits do not depend on the number of threads.
 
-Sources: Y. Bard, Nonlinear Parameter Estimation, 1974, section 4-9; J. Demmel,
-L. Grigori, M. Hoemmen, J. Langou, SIAM J. Sci. Comput. 34, 2012.
+Sources: Y. Bard, Nonlinear Parameter Estimation, 1974, section 4-9; J. Demmel, L. Grigori,
+M. Hoemmen, J. Langou, SIAM J. Sci. Comput. 34, 2012.
 """
 
 from collections.abc import Callable, Mapping, Sequence

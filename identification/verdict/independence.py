@@ -67,7 +67,7 @@ class Regressor(NamedTuple):
 
 
 class DependenceTest(NamedTuple):
-    """Columns that test for one type of dependence.
+    """Family of columns that tests for one type of dependence.
 
     Attributes:
         what: name of the dependence in a message: "the residuals of x depend on ...".

@@ -1,6 +1,6 @@
 """Re-simulation of the models under an optimised control, from start to end.
 
-An `Arc` contains the data of one optimised phase that the simulation requires.
+A `PhaseMotion` contains the data of one optimised phase that the simulation requires.
 """
 
 from collections.abc import Callable, Mapping, Sequence

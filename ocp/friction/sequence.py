@@ -1,9 +1,9 @@
 """Mode sequences: slip directions and stick of contacts over time.
 
 A contact slips forwards (+1), sticks (0) or slips backwards (-1). A `ModeInterval` has one mode of
-a contact, and a `Track` consists of its runs in order. An `Arc` is an interval with
-constant modes of all contacts. Ends of phases and via points, whose times are given by the user,
-divide the motion into `Leg`s of arcs with free durations.
+a contact, and a `Track` consists of its intervals in order. An `Arc` is an interval with constant
+modes of all contacts. Ends of phases and via points, whose times are given by the user, divide the
+motion into `Leg`s of arcs with free durations.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence

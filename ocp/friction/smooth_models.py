@@ -50,9 +50,10 @@ class Width(NamedTuple):
     least: float = 0.0
 
     def at(self, layer: float) -> float:
-        """Return the value of the parameter for a smoothing width `layer` [m/s]."""
-        own = 1.0 if self.layer is None else self.layer
-        return self.number * (layer / own) ** self.exponent
+        """Return the parameter for a smoothing width `layer` [m/s]; `number` if one of loads."""
+        if self.layer is None:
+            return self.number
+        return self.number * (layer / self.layer) ** self.exponent
 
 
 def smooth_model(model: Model) -> Model:

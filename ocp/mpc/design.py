@@ -166,7 +166,7 @@ class Design:
 
     @cached_property
     def row_prices(self) -> Array:
-        """Linear and quadratic penalties of soft rows of one interval and the end, 0 if hard."""
+        """Linear, and equal quadratic, penalties of rows of one interval and the end; 0 if hard."""
         soft = np.array([limit.soft for limit in self.horizon.all_limits], dtype=bool)
         return np.where(soft, self.penalty * self.horizon.weight, 0.0)
 

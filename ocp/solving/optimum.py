@@ -213,7 +213,7 @@ class Optimum:
         return weight * total
 
     def over_time(self, values: Sequence[SpanPoints], letters: str = "x") -> dict[str, Array]:
-        """Return `values` by name at the times "t" of the first scenario; see `Motion`.
+        """Return `values` by name at the times "t" of the first scenario; see `ScenarioMotion`.
 
         Args:
             values: values of each phase; durations T determine the times.

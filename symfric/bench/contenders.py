@@ -25,7 +25,7 @@ from symfric.integrator.compiled.compiler import library
 from symfric.integrator.equations.initial import consistent, first_guess, first_step, smallest_step
 from symfric.integrator.equations.inputs import InputData, input_data
 from symfric.integrator.equations.system import System, system
-from symfric.integrator.methods.attempt import Given, SRow
+from symfric.integrator.methods.attempt import RRow, SRow
 from symfric.integrator.prepared import chosen
 from symfric.integrator.running.events import Stop
 from symfric.integrator.running.integrator import Integrator
@@ -79,7 +79,7 @@ def loop(model: Model, times: Array, watched: Watched, rtol: float) -> Contender
 
     def solve(**start: float) -> tuple[Array, Callable[[], int]]:
         work.S[:] = SRow.at(0.0, first_step(end), begin(**start))
-        work.R[:] = Given.of(end, rtol, end, 0.1 * rtol * whole.nominal, inputs.values[:, 0])
+        work.R[:] = RRow.of(end, rtol, end, 0.1 * rtol * whole.nominal, inputs.values[:, 0])
         outputs, steps, reason = Outputs.at(times, whole.n), 0, Stop.FULL
         work.loop.h_min = smallest_step(end)
         work.want(outputs)

@@ -13,7 +13,7 @@ from symfric.integrator.cuda.device import Device, DeviceError
 from symfric.integrator.equations.initial import first_guess, first_step, smallest_step
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.many.members import program
-from symfric.integrator.methods.attempt import Given, SRow
+from symfric.integrator.methods.attempt import RRow, SRow
 from symfric.integrator.methods.tableaux import ADAPTIVE
 from symfric.integrator.running.events import Stop
 from symfric.integrator.running.integrator import built
@@ -128,7 +128,7 @@ def _one_by_one(
         y = np.array([integrator.start(one, given) for one, given in zip(y, d, strict=True)])
     S = np.ascontiguousarray(SRow.at(0.0, first_step(end), y))
     atol = 0.1 * RTOL * integrator.system.nominal
-    R = np.ascontiguousarray(Given.of(end, RTOL, np.inf, atol, d))
+    R = np.ascontiguousarray(RRow.of(end, RTOL, np.inf, atol, d))
 
     def run() -> tuple[Array, Array]:
         now, attempts = S.copy(), np.zeros(members)

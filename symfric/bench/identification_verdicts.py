@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 @final
 @dataclass(frozen=True)
 class Setup:
-    """Experiment with known parameters.
+    """Scene: an experiment with known parameters.
 
     Attributes:
         name: name of the scene.

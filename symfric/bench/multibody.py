@@ -17,7 +17,7 @@ from symfric.foundation.numeric import bound
 from symfric.foundation.programs import find_compiler
 from symfric.integrator.equations.initial import consistent, first_guess
 from symfric.integrator.equations.inputs import input_data
-from symfric.integrator.methods.attempt import Given, SRow
+from symfric.integrator.methods.attempt import RRow, SRow
 from symfric.integrator.methods.tableaux import METHODS
 from symfric.integrator.running.integrator import Integrator
 from symfric.multibody import JointFriction, Mechanism, Revolute
@@ -254,7 +254,7 @@ def step_time(made: Integrator) -> float:
     d = np.zeros(whole.d.numel())
     y = consistent(whole, "bench", y, d)
     S = SRow.at(0.0, 1e-4, y)
-    R = Given.of(1.0, 1e-6, 1.0, 1e-7 * whole.nominal, d)
+    R = RRow.of(1.0, 1e-6, 1.0, 1e-7 * whole.nominal, d)
     S_out, D = np.zeros(S.size), np.zeros(made.step.numel_out(1))
     return best_time(bound(made.step, (S, R), (S_out, D)), budget=0.1, most=1000)[0]
 

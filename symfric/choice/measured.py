@@ -165,20 +165,20 @@ class Requirements:
         return Wanted(self.accuracy, self.control if self.fixed else 0.0)
 
 
-def best_form(task: Requirements, name: str, laws: Sequence[Law]) -> RankedLaw:
+def best_form(required: Requirements, name: str, laws: Sequence[Law]) -> RankedLaw:
     """Return the row of the first ranked form of a law, or of its best form if none is ranked.
 
     If a form lacks a required phenomenon, the other forms lack it as well and are not measured.
     """
     rows: list[RankedLaw] = []
     for law in laws:
-        rows.append(measured(task, name, law))
+        rows.append(measured(required, name, law))
         if rows[-1].standing in (RANKED, LACKING) or rows[-1].spent:
             break
     return min(rows, key=place)
 
 
-def measured(task: Requirements, name: str, law: Law) -> RankedLaw:
+def measured(required: Requirements, name: str, law: Law) -> RankedLaw:
     """Return the row of `law`; errors of the law or of the machine become the reason."""
     known, hard = nature.physical(law)
     operations, why = nature.c_operations(law)
@@ -190,18 +190,24 @@ def measured(task: Requirements, name: str, law: Law) -> RankedLaw:
     tried = list[tuple[RankedLaw, Candidate, SmoothingStudy]]()
     for bristles in OF_BRISTLES if law.states else OF_BRISTLES[:1]:
         try:
-            held = candidate(task.machine, law, task.frictions, task.load, task.own, bristles)
-            instructions, _ = continuation.counted(task.machine, held.first, task.goal.coarse)
+            held = candidate(
+                required.machine, law, required.frictions, required.load, required.own, bristles
+            )
+            instructions, _ = continuation.counted(
+                required.machine, held.first, required.goal.coarse
+            )
         except FAILURES as problem:
             text = short(problem)
             _, lacks, inputs = text.partition("got one that needs ")
-            refusal = f"needs {inputs}, which {task.machine.name} does not give" if lacks else text
+            refusal = (
+                f"needs {inputs}, which {required.machine.name} does not give" if lacks else text
+            )
             return replace(row, reason=refusal)
-        runs, found = Budget(held, instructions, task.work), SmoothingStudy((), "")
+        runs, found = Budget(held, instructions, required.work), SmoothingStudy((), "")
         try:
-            task = _from_own(task, held, runs)
-            found = continuation.continued(runs, task.reference, task.goal)
-            placed = _placed(task, held, found, runs, row)
+            required = _from_own(required, held, runs)
+            found = continuation.continued(runs, required.reference, required.goal)
+            placed = _placed(required, held, found, runs, row)
             tried.append((replace(placed, spent=not runs.left()), held, found))
         except FAILURES as problem:
             failed = replace(row, standing=FAILED, reason=short(problem))
@@ -212,18 +218,18 @@ def measured(task: Requirements, name: str, law: Law) -> RankedLaw:
     row, held, found = min(tried, key=lambda each: place(each[0]))
     if row.standing == FAILED:
         return row
-    if task.fixed:
+    if required.fixed:
         core, why = nature.on_core(law) if operations is not None else (nan, row.c_why)
-        row = replace(_stepped(task, held, found, row), core=core, core_why=why)
-    return _by_data(task.misfits, row)
+        row = replace(_stepped(required, held, found, row), core=core, core_why=why)
+    return _by_data(required.misfits, row)
 
 
-def _from_own(task: Requirements, held: Candidate, runs: Budget) -> Requirements:
-    """Return the task with a fine run of the law as the reference if the reference is `OWN`."""
-    if task.reference is not OWN:
-        return task
-    run = held.run(held.first, 0.1 * task.goal.fine, 10 * runs.most)
-    return replace(task, reference=replace(OWN, motion=run.motion, size=run.size))
+def _from_own(required: Requirements, held: Candidate, runs: Budget) -> Requirements:
+    """Return the required with a fine run of the law as the reference if the reference is `OWN`."""
+    if required.reference is not OWN:
+        return required
+    run = held.run(held.first, 0.1 * required.goal.fine, 10 * runs.most)
+    return replace(required, reference=replace(OWN, motion=run.motion, size=run.size))
 
 
 def _by_data(misfits: dict[str, float] | None, row: RankedLaw) -> RankedLaw:
@@ -239,58 +245,60 @@ def _by_data(misfits: dict[str, float] | None, row: RankedLaw) -> RankedLaw:
 
 
 def _placed(
-    task: Requirements, held: Candidate, levels: SmoothingStudy, runs: Budget, row: RankedLaw
+    required: Requirements, held: Candidate, levels: SmoothingStudy, runs: Budget, row: RankedLaw
 ) -> RankedLaw:
     """Return the row with the measurements and the standing.
 
     Raises:
         SolveError: no run reaches the end of the motion.
     """
-    at = _judged(task, levels, runs)
+    at = _judged(required, levels, runs)
     curve = tuple(
         (level.error, float(level.attempts * runs.instructions)) for level in levels.levels
     )
-    counts, method = continuation.counted(task.machine, at.model, at.rtol)
+    counts, method = continuation.counted(required.machine, at.model, at.rtol)
     law = held.law_at(at.s)
     row = replace(
         row, curve=curve, error=at.error, own_error=at.own, smoothing=at.s, rtol=at.rtol,
         method=method, attempts=at.run.attempts, instructions=counts,
-        time_s=_timed(task, law, at, runs), values=_own_numbers(law),
+        time_s=_timed(required, law, at, runs), values=_own_numbers(law),
         steepness=nature.steepness(law, 1.0),
     )  # fmt: skip
-    if missing := lacking(task.needs, row.phenomena):
+    if missing := lacking(required.needs, row.phenomena):
         return replace(row, standing=LACKING, reason=f"shows no {', no '.join(missing)}")
-    if row.error <= task.accuracy:
+    if row.error <= required.accuracy:
         return replace(row, standing=RANKED)
     driest = held.law_at(levels.levels[-1].s)
-    known = "" if task.own else nature.otherwise(driest, task.frictions[""], task.load)
+    known = "" if required.own else nature.otherwise(driest, required.frictions[""], required.load)
     why = short(levels.stopped) or "no run keeps it, or not at tighter tolerances"
     why = "not decided: " * bool(levels.stopped and not levels.decided) + why
     why += f"; {known}" * bool(known)
     return replace(row, standing=INACCURATE, reason=f"{row.error:.1e} off: {why}")
 
 
-def _judged(task: Requirements, levels: SmoothingStudy, runs: Budget) -> AtEqualError:
+def _judged(required: Requirements, levels: SmoothingStudy, runs: Budget) -> AtEqualError:
     """Return the run at equal error from the reference, or at equal own error if there is none.
 
     Raises:
         SolveError: no run reaches the end of the motion.
     """
-    s = levels.softest(MARGIN * task.accuracy)
+    s = levels.softest(MARGIN * required.accuracy)
     last = levels.levels[-1]
     if s is not None:
         for smoothing in (s, last.s):  # s lies between two levels, where the error is estimated
             with suppress(SolveError):
-                at = at_equal_error(runs, smoothing, task.reference, task.goal, last, whole=True)
-                if at.error <= task.accuracy and _holds(task, at, runs):
+                at = at_equal_error(
+                    runs, smoothing, required.reference, required.goal, last, whole=True
+                )
+                if at.error <= required.accuracy and _holds(required, at, runs):
                     return at
-        off = tuple(level for level in levels.levels if level.error > task.accuracy)
+        off = tuple(level for level in levels.levels if level.error > required.accuracy)
         levels = replace(levels, levels=off or levels.levels[:1])
     near = continuation.nearest(levels)
-    return at_equal_error(runs, near.s, task.reference, task.goal, near, whole=False)
+    return at_equal_error(runs, near.s, required.reference, required.goal, near, whole=False)
 
 
-def _holds(task: Requirements, at: AtEqualError, runs: Budget) -> bool:
+def _holds(required: Requirements, at: AtEqualError, runs: Budget) -> bool:
     """Return True if a run at a much tighter tolerance satisfies the accuracy as well.
 
     Runs of stiff bristles may fail this test because of rounding errors.
@@ -299,7 +307,7 @@ def _holds(task: Requirements, at: AtEqualError, runs: Budget) -> bool:
     if not runs.held.law.states or tighter >= at.rtol:
         return True
     try:
-        return task.reference.off(runs.run(at.s, tighter).motion) <= task.accuracy
+        return required.reference.off(runs.run(at.s, tighter).motion) <= required.accuracy
     except SolveError as problem:
         return problem.status is Status.MAX_STEPS
 
@@ -313,11 +321,11 @@ def _own_numbers(law: Law) -> dict[str, float]:
     return {n: value for n, value in values.items() if value != starts.get(n, inf)}
 
 
-def _timed(task: Requirements, law: Law, at: AtEqualError, runs: Budget) -> float:
+def _timed(required: Requirements, law: Law, at: AtEqualError, runs: Budget) -> float:
     """Return the shortest processor time [s] of several calls, without building the integrator."""
     best, began = inf, process_time()
     for _ in range(ROUNDS):
-        found = quiet_run(task.machine, at.model, law, at.rtol, runs.most)
+        found = quiet_run(required.machine, at.model, law, at.rtol, runs.most)
         best = min(best, found.time_s)
         if process_time() - began > PATIENCE:
             break
@@ -325,25 +333,25 @@ def _timed(task: Requirements, law: Law, at: AtEqualError, runs: Budget) -> floa
 
 
 def _stepped(
-    task: Requirements, held: Candidate, levels: SmoothingStudy, row: RankedLaw
+    required: Requirements, held: Candidate, levels: SmoothingStudy, row: RankedLaw
 ) -> RankedLaw:
     """Return the row with the largest fixed steps, for the law as smooth as `control` allows.
 
     If the law does not satisfy `control` at any smoothing, the smoothing of `row` is used.
     """
-    s = levels.softest(task.control)
+    s = levels.softest(required.control)
     try:
         model, law = held.model(s or row.smoothing), held.law_at(s or row.smoothing)
-        machine = replace(task.machine, of=None, times=None)
-        most = max(continuation.LEAST, task.work // row.instructions)
-        run = quiet_run(machine, model, law, row.rtol if s is None else task.goal.fine, most)
+        machine = replace(required.machine, of=None, times=None)
+        most = max(continuation.LEAST, required.work // row.instructions)
+        run = quiet_run(machine, model, law, row.rtol if s is None else required.goal.fine, most)
     except FAILURES as problem:
         return replace(row, fixed_why=short(problem), explicit_why=short(problem))
     names = positions(model, law)
     t = np.linspace(0.0, machine.t_end, run.motion.shape[1])
     motion = ReferenceMotion(names, t, run.motion, run.size)
-    implicit = largest(machine, model, "backward_euler", motion, task.control)
-    explicit = largest(machine, model, "dopri5", motion, task.control)
+    implicit = largest(machine, model, "backward_euler", motion, required.control)
+    explicit = largest(machine, model, "dopri5", motion, required.control)
     return replace(
         row, fixed_step=implicit[0], fixed_why=short(implicit[1]),
         explicit_step=explicit[0], explicit_why=short(explicit[1]),

@@ -210,13 +210,13 @@ def select(
         compared, about = OWN, "the data that they were fitted to"
     of_data = data is not None or misfits is not None
     fitted = of_data if fitted is None else checks.flag(f"{where}: fitted", fitted)
-    task = Requirements(
+    required = Requirements(
         machine, compared, words, frictions, load, accuracy, control, fitted,
         checks.flag(f"{where}: fixed_steps", fixed_steps), max(1, round(effort * RUN)), misfits,
     )  # fmt: skip
     rows: list[RankedLaw] = []
     with suppress(KeyboardInterrupt):
-        for row in _rows(task, candidates, count):
+        for row in _rows(required, candidates, count):
             rows.append(row)
             if progress is not None:
                 progress(row.law, len(rows) / len(candidates))
@@ -251,16 +251,16 @@ def laws_of(where: str, laws: Candidates | None) -> Forms:
     return found
 
 
-def _rows(task: Requirements, laws: Forms, workers: int) -> Iterator[RankedLaw]:
+def _rows(required: Requirements, laws: Forms, workers: int) -> Iterator[RankedLaw]:
     """Yield the rows; with several workers each law has a process, and rows come as they finish.
 
     The processes are forked, since functions defined in a user's file cannot be sent.
     """
     if workers == 1 or "fork" not in get_all_start_methods():
-        yield from (best_form(task, name, law) for name, law in laws.items())
+        yield from (best_form(required, name, law) for name, law in laws.items())
         return
     names, tasks = [*laws], enumerate(laws.items())
-    for number, row in outcomes(lambda at: best_form(task, *at), tasks, workers, start="fork"):
+    for number, row in outcomes(lambda at: best_form(required, *at), tasks, workers, start="fork"):
         if isinstance(row, Crashed):
             yield RankedLaw(
                 names[number], FAILED, f"its process ended with {row.how}: {row.last_line}"

@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from symfric.dynamics.branch import Branch, Special
 from symfric.dynamics.continuation import checked_span
-from symfric.dynamics.curve import CurveEquations as Curve
-from symfric.dynamics.curve import Node, at_edge, corrected, followed
+from symfric.dynamics.curve import CurveEquations, Node, at_edge, corrected, followed
 from symfric.dynamics.curve import tangent as direction
 from symfric.dynamics.equations import equations, tangent
 from symfric.dynamics.families import REAL, TINY, Equilibria
@@ -88,7 +87,7 @@ class Boundary(Showing):
 
 @final
 @dataclass(frozen=True, eq=False)
-class BoundaryEquations(Curve):
+class BoundaryEquations(CurveEquations):
     """Equations of a boundary; z = (y, first parameter, second parameter)."""
 
     rest: Equilibria
@@ -112,7 +111,7 @@ class BoundaryEquations(Curve):
         return found.real / abs(found) if self.hopf else found.real * float(self.scale[-1])
 
     def at(self, z: Array) -> Node:
-        """Return the linearised equations; see `Curve.at`."""
+        """Return the linearised equations; see `CurveEquations.at`."""
         node = self.rest.at(z)
         row = [
             (self.growth(z + a * e) - self.growth(z - a * e)) / (2 * a)

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from symfric.dynamics.balance import rows_at_rest
 from symfric.dynamics.branch import Special
-from symfric.dynamics.curve import ContinuationStep, Node, located
-from symfric.dynamics.curve import CurveEquations as Curve
+from symfric.dynamics.curve import ContinuationStep, CurveEquations, Node, located
 from symfric.dynamics.equations import ModelEquations, tangent
 from symfric.dynamics.shooting import LinearisedShooting, OrbitShooting
 from symfric.foundation.numeric import Array
@@ -49,7 +48,7 @@ def sequence(node: Node) -> str:
     return ""
 
 
-class Family(Curve):
+class Family(CurveEquations):
     """Equations of a family over one parameter, and the deviations from its members."""
 
     @abstractmethod
@@ -107,7 +106,7 @@ class Orbits(Family):
     Attributes:
         problem: shooting equations with the derivatives by the parameter.
         p: values of all free parameters.
-        scale, tolerance: see `Curve`.
+        scale, tolerance: see `CurveEquations`.
         section: a state and the rate there: the start of each orbit is in the plane through the
             state that is orthogonal to the rate. By default, the phase is that of the prediction.
     """
@@ -124,7 +123,7 @@ class Orbits(Family):
         return self.problem.names[0]
 
     def at(self, z: Array) -> Node:
-        """Return the linearised shooting equations; see `Curve.at`."""
+        """Return the linearised shooting equations; see `CurveEquations.at`."""
         nx = z.size - 2
         if not z[nx] > 0:
             raise ValueError("the period falls to zero")
@@ -150,7 +149,7 @@ class Orbits(Family):
         return Node(z, np.concatenate(rows), np.vstack(slopes), every, D, found)
 
     def anchored(self, node: Node) -> tuple[Self, Node]:
-        """Return the equations with a section that the orbit of `node` crosses; see `Curve`."""
+        """Return the equations with a section that the orbit of `node` crosses."""
         if self.problem.driven:
             return self, node
         part, size = node.content.segments[0], self.problem.scale
@@ -219,7 +218,7 @@ class Equilibria(Family):
         eq: equations of the model.
         d: inputs and parameters.
         free: indices of the free parameters in d.
-        scale, tolerance: see `Curve`.
+        scale, tolerance: see `CurveEquations`.
     """
 
     eq: ModelEquations
@@ -229,7 +228,7 @@ class Equilibria(Family):
     tolerance: float
 
     def at(self, z: Array) -> Node:
-        """Return the linearised equations of an equilibrium; see `Curve.at`."""
+        """Return the linearised equations of an equilibrium; see `CurveEquations.at`."""
         if self.turns(z):
             raise ValueError("a sliding contact comes to rest")
         y, d = self.split(z)

@@ -1,4 +1,4 @@
-"""Shooting equations of periodic orbits, with exact derivatives through stick and slip.
+"""Shooting equations of periodic orbits with exact derivatives, and their solution.
 
 The period T is divided into equal segments. With the flow phi of the model,
 
@@ -7,7 +7,8 @@ The period T is divided into equal segments. With the flow phi of the model,
 where S = 1, or the signs of a symmetric orbit, whose T is half of its period. The unknowns are the
 independent coordinates of each x_i (constraints of mechanisms and sticking contacts are kept), and
 T unless it is given. Without a given period, the correction of x_0 is orthogonal to its rate. The
-derivatives of phi are those of `simulate`, with saltation matrices at events.
+derivatives of phi are those of `simulate`, with saltation matrices at events. `solved` finds an
+orbit by damped Newton steps.
 """
 
 from collections.abc import Mapping

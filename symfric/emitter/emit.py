@@ -202,14 +202,8 @@ class _Body:
 
     def _goal(self, select: int) -> int | StoreStatement:
         """Return the result that a select is written to, or the select whose variable it shares."""
-        goal = self.plan.goals.get(select)
-        return (
-            select
-            if goal is None
-            else goal
-            if isinstance(goal, StoreStatement)
-            else self._goal(goal)
-        )
+        goal = self.plan.goals.get(select, select)
+        return goal if goal == select or isinstance(goal, StoreStatement) else self._goal(goal)
 
     def _stored(self, store: StoreStatement, value: int) -> str:
         shown = (self.writer.truth if store.result in self.truths else self.writer.number)(value)

@@ -14,7 +14,7 @@ from symfric.foundation.programs import CompileError, find_compiler
 from symfric.foundation.status import SolveError, Status
 from symfric.integrator.equations.initial import consistent, first_guess
 from symfric.integrator.many.members import fastest
-from symfric.integrator.methods.attempt import Given, SRow
+from symfric.integrator.methods.attempt import RRow, SRow
 from symfric.integrator.running.crossings import Memory
 from symfric.integrator.running.diagnosis import explain
 from symfric.integrator.running.integrator import Integrator
@@ -152,14 +152,14 @@ class Plant:
         remembered = Memory.new(len(self.model.events), self._tolerance)
         for b, guess, own, y in zip(which, guesses, values, found, strict=True):
             plants.S[b] = SRow.at(plants.begin[b], h, y)
-            plants.R[b, Given.d(system.nx)] = np.concatenate([own, held])
-            plants.R[b, Given.T_END] = plants.begin[b]
+            plants.R[b, RRow.d(system.nx)] = np.concatenate([own, held])
+            plants.R[b, RRow.T_END] = plants.begin[b]
             plants.u[b], plants.count[b], plants.why[b] = held, 0, Why.END
             plants.memory[b] = remembered
             self._fresh[b] = guess
             self.failed.pop(b, None)
         if which:  # pivots that are stable at the start of the first plant
-            self._places = [(guesses[0], plants.R[which[0], Given.d(system.nx)].copy())]
+            self._places = [(guesses[0], plants.R[which[0], RRow.d(system.nx)].copy())]
             suited = self._own.suited(self._places, SAMPLES * self.dt)
             if suited is not self._integrator:
                 self._use(suited)
@@ -271,9 +271,9 @@ class Plant:
         if not np.isfinite(plants.u).all():
             return
         for b, guess in self._fresh.items():
-            d = plants.R[b, Given.d(system.nx)].copy()
+            d = plants.R[b, RRow.d(system.nx)].copy()
             d[d.size - nu :] = plants.u[b]
-            if system.free.any() and (d != plants.R[b, Given.d(system.nx)]).any():
+            if system.free.any() and (d != plants.R[b, RRow.d(system.nx)]).any():
                 plants.S[b, SRow.Y] = self._integrator.consistent("stepper", guess, d)
             plants.ready[b] = 1
         self._fresh.clear()
@@ -300,7 +300,7 @@ class Plant:
     def _help(self, b: int) -> tuple[Status, str] | None:
         """Prepare a plant to continue, or return the reason why it cannot."""
         plants, system = self._plants, self._integrator.system
-        t, y, d = plants.S[b, SRow.T], plants.S[b, SRow.Y], plants.R[b, Given.d(system.nx)]
+        t, y, d = plants.S[b, SRow.T], plants.S[b, SRow.Y], plants.R[b, RRow.d(system.nx)]
         where = f"stepper '{self.model.name}' at t = {t:.9g} s"
         if plants.why[b] == Why.ATTEMPTS:
             return Status.MAX_STEPS, f"{where}: {Status.MAX_STEPS.value}"
@@ -361,7 +361,7 @@ class Plant:
     ) -> tuple[Array, Array]:
         """Return initial guesses of the unknowns and the parameters, one row for each plant."""
         plants, system, count = self._plants, self._integrator.system, len(which)
-        own = plants.R[which, Given.d(system.nx)].T
+        own = plants.R[which, RRow.d(system.nx)].T
         every = {v.name: own[i] for i, v in enumerate(self.model.p)} | p
         if not count:
             return np.zeros((0, system.n)), np.zeros((0, len(every)))

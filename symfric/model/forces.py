@@ -213,14 +213,14 @@ def _refused(c: Contact, expected: str) -> ValueError:
 M = TypeVar("M", bound=System)
 
 
-def by_laws(model: System) -> Put:
-    """Return the substitution that replaces the forces of all contacts by those of their laws.
+def by_laws(model: System, expression: ca.SX) -> ca.SX:
+    """Return `expression` with the forces of all contacts replaced by those of their laws.
 
     Raises:
         ValueError: friction forces depend on each other.
     """
     forces = {c.name: c.friction for c in model.contacts}
-    return _put(f"model '{model.name}': contacts", model.contacts, forces)
+    return _put(f"model '{model.name}': contacts", model.contacts, forces)(expression)
 
 
 def closed(model: System) -> dict[str, Any]:

@@ -294,7 +294,7 @@ class Mark:
             contact counts as sticking.
         grounded: True if a is on the ground.
         contacts: names of the contacts with friction of this element.
-        label: symbols or values of stiffness and damping.
+        label: symbols or values of stiffness and damping, or the name.
     """
 
     name: str

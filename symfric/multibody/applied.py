@@ -52,7 +52,7 @@ from symfric.model import Variables, kinds
 from symfric.multibody.contact import UNLOADED, Contact, law_places
 from symfric.multibody.equations import Equations
 from symfric.multibody.joints import Floating
-from symfric.multibody.prepare import Assembled
+from symfric.multibody.prepare import PreparedMechanism
 from symfric.multibody.spatial import GROUND, euler_e
 
 
@@ -235,7 +235,7 @@ class _Maker:
         a0: accelerations without friction at the start.
     """
 
-    def __init__(self, where: str, made: Assembled, a0: Array) -> None:
+    def __init__(self, where: str, made: PreparedMechanism, a0: Array) -> None:
         self.where, self.made, self.eq, self.a0 = where, made, made.eq, a0
 
     def numbers(self, expression: ca.SX) -> Array:
@@ -309,7 +309,7 @@ class _Maker:
         return self.group(name, members, along, ca.dot(Z, eq.qd), ca.dot(Z, eq.a), Z.T, columns)
 
 
-def rests(where: str, made: Assembled, a0: Array) -> tuple[Rest, ...]:
+def rests(where: str, made: PreparedMechanism, a0: Array) -> tuple[Rest, ...]:
     """Return the groups of contacts whose laws need F_e.
 
     Raises:

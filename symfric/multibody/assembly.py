@@ -28,7 +28,7 @@ from symfric.model.parts import Holonomic, Inner
 from symfric.multibody.applied import Rest, rests, solve_mass
 from symfric.multibody.contact import depends_on_load
 from symfric.multibody.equations import Equations, normals_with
-from symfric.multibody.prepare import Assembled, with_cuts, without_friction
+from symfric.multibody.prepare import PreparedMechanism, with_cuts, without_friction
 from symfric.multibody.results import Put, constraint_units, results, sketch
 from symfric.multibody.slips import Slip, events, keeps_deflection, slips
 
@@ -39,7 +39,7 @@ Stick of such laws is exact up to rounding.
 """
 
 
-def assemble(name: str, made: Assembled, index: int) -> Model:
+def assemble(name: str, made: PreparedMechanism, index: int) -> Model:
     """Return the model of the mechanism `name`; `index` is that of `Holonomic`."""
     eq, cut = made.eq, with_cuts(made)
     a0, lam0, N0 = without_friction(made)
@@ -59,9 +59,9 @@ def assemble(name: str, made: Assembled, index: int) -> Model:
 
 
 def _model(
-    name: str, index: int, multipliers: Variables, made: Assembled, contacts: Sequence[Slip],
-    groups: Sequence[Rest], inner: Inner | None, frictional: tuple[Contact, ...] = (),
-    opening: Callable[[], Model] | None = None,
+    name: str, index: int, multipliers: Variables, made: PreparedMechanism,
+    contacts: Sequence[Slip], groups: Sequence[Rest], inner: Inner | None,
+    frictional: tuple[Contact, ...] = (), opening: Callable[[], Model] | None = None,
 ) -> Model:  # fmt: skip
     """Return the model of a mechanism with the given contacts and groups of sticking contacts."""
     eq, p = made.eq, made.p
@@ -127,7 +127,7 @@ def _contact(s: Slip) -> Contact:
 
 
 def _opened(
-    model: Callable[..., Model], made: Assembled, contacts: Sequence[Slip],
+    model: Callable[..., Model], made: PreparedMechanism, contacts: Sequence[Slip],
     frictional: Sequence[Contact],
 ) -> Model:  # fmt: skip
     """Return the model with friction forces as inputs; balls keep their laws."""

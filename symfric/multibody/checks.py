@@ -20,7 +20,7 @@ from symfric.multibody.element_friction import ElementFriction
 from symfric.multibody.equations import Equations
 from symfric.multibody.forces import Axial, Load, Part
 from symfric.multibody.joint import Joint, JointFriction
-from symfric.multibody.prepare import Assembled, weightless
+from symfric.multibody.prepare import PreparedMechanism, weightless
 from symfric.multibody.spatial import GROUND, Body
 from symfric.multibody.topology import Topology, body_of
 
@@ -175,7 +175,7 @@ def connected(topology: Topology) -> Iterator[str]:
         yield "expected bodies that can move, got none"
 
 
-def left_open(made: Assembled) -> Iterator[str]:
+def left_open(made: PreparedMechanism) -> Iterator[str]:
     """Yield messages about friction that depends on undetermined reactions."""
     for name in made.undetermined:
         yield (
@@ -188,7 +188,7 @@ def left_open(made: Assembled) -> Iterator[str]:
         yield "start: expected independent constraints, got a singular position; start elsewhere"
 
 
-def undeclared_in_forces(made: Assembled) -> Iterator[str]:
+def undeclared_in_forces(made: PreparedMechanism) -> Iterator[str]:
     """Yield messages about undeclared symbols in forces."""
     eq = made.eq
     known = ca.vertcat(eq.q, eq.qd, eq.angles, symbols_of((*made.p, *made.u)), eq.kin.t)
@@ -202,7 +202,7 @@ def _parts(load: Load | Axial) -> tuple[ca.SX, ...]:
     return (load.value,) if isinstance(load, Axial) else (load.force, load.moment)
 
 
-def infinite(made: Assembled) -> Iterator[str]:
+def infinite(made: PreparedMechanism) -> Iterator[str]:
     """Yield messages about forces that are not finite at the start, with zero inputs."""
     for force, loads in zip(made.eq.forces, made.eq.loads, strict=True):
         (found,) = made.numbers(ca.veccat(*(_parts(x)[0] for x in loads)))
@@ -213,7 +213,7 @@ def infinite(made: Assembled) -> Iterator[str]:
             )
 
 
-def without_inertia(made: Assembled) -> Iterator[str]:
+def without_inertia(made: PreparedMechanism) -> Iterator[str]:
     """Yield messages about coordinates without inertia near the start."""
     eq = made.eq
     if not any(eq.kin.topology.bodies[link.body].ideal for link in eq.kin.topology.links):
@@ -229,7 +229,7 @@ def without_inertia(made: Assembled) -> Iterator[str]:
         )
 
 
-def inseparable(made: Assembled) -> Iterator[str]:
+def inseparable(made: PreparedMechanism) -> Iterator[str]:
     """Yield messages about bodies whose inertia does not allow absolute coordinates."""
     for name, body in made.eq.kin.topology.bodies.items():
         if body.ideal and name != GROUND and any(replace(body, ideal=False).problems(made.p)):

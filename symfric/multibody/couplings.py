@@ -109,7 +109,7 @@ class RatioCoupling(Coupling):
         return getattr(self, self.ratio_field)
 
     def problems(self) -> Iterator[str]:
-        """Yield messages about invalid numbers, a zero ratio, or identical displacements."""
+        """Yield messages about invalid values and a zero ratio."""
         yield from super().problems()
         given = getattr(self, self.ratio_field)
         if equals(given, 0.0):

@@ -1,7 +1,7 @@
 """Friction of machine elements whose normal force is their own reaction: threads, teeth, cams.
 
-An element that couples s_b = ratio s_a + offset transmits the multiplier lam, a force or moment on
-b. A contact between its flanks has the sliding velocity v and the normal force N
+An element that couples s_b to s_a, such as s_b = ratio s_a + offset, transmits the multiplier lam,
+a force or moment on b. The contact of its flanks has the sliding velocity v and normal force N
 
     v = l_a s_a' + l_b s_b',   N = preload + sqrt((lam / d)^2 + eps^2)
 

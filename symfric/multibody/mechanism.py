@@ -25,7 +25,7 @@ from symfric.multibody.element_friction import ElementFriction
 from symfric.multibody.forces import Force, Gravity, SpringDamper
 from symfric.multibody.joint import Joint
 from symfric.multibody.prepare import (
-    Assembled,
+    PreparedMechanism,
     following,
     in_absolute_coordinates,
     project,
@@ -205,7 +205,7 @@ class Mechanism(packed.Portable, Showing):
         chosen = (0 if formulation == "absolute" else 1) if index is None else index
         return assemble(self.name, self.prepare(p, formulation), chosen)
 
-    def prepare(self, p: Variables = (), formulation: str = "joint") -> Assembled:
+    def prepare(self, p: Variables = (), formulation: str = "joint") -> PreparedMechanism:
         """Check the mechanism and return its equations of motion with their variables.
 
         Raises:

@@ -38,7 +38,7 @@ The second number is for friction from reactions, which makes dense derivatives 
 
 @final
 @dataclass(frozen=True, eq=False)
-class Assembled:
+class PreparedMechanism:
     """Equations of a mechanism with their variables and start values.
 
     Attributes:
@@ -122,7 +122,7 @@ def coordinates(topology: Topology) -> tuple[Variables, Variables]:
 def written(
     topology: Topology, forces: Sequence[Force], constraints: Sequence[Constraint], p: Variables,
     u: Variables = (),
-) -> Assembled:  # fmt: skip
+) -> PreparedMechanism:  # fmt: skip
     """Return the equations of motion with independent constraints only."""
     q, qd = coordinates(topology)
     q0, qd0 = (at_start(starts_of(group), p).full().ravel() for group in (q, qd))
@@ -130,7 +130,9 @@ def written(
     arguments = topology, forces, constraints, symbols_of(q), symbols_of(qd), t
     eq = equations(*arguments)
     labels = tuple(eq.multipliers)
-    made = Assembled(eq, p, u, q, qd, q0, qd0, labels, problems=tuple(_held(eq, constraints, p)))
+    made = PreparedMechanism(
+        eq, p, u, q, qd, q0, qd0, labels, problems=tuple(_held(eq, constraints, p))
+    )
     if not eq.m or made.problems:
         return made
     at = made.position
@@ -167,7 +169,7 @@ def _held(eq: Equations, constraints: Sequence[Constraint], p: Variables) -> Ite
             )
 
 
-def _misfits(made: Assembled, at: Position) -> Iterator[str]:
+def _misfits(made: PreparedMechanism, at: Position) -> Iterator[str]:
     """Yield messages about constraints violated at the start, with the nearest valid values."""
     phi, J, phi_t = at(made.q0)
     speed = J @ made.qd0 + phi_t
@@ -182,7 +184,9 @@ def _misfits(made: Assembled, at: Position) -> Iterator[str]:
         yield _offer("velocities", made, speed, made.qd, following(J, made.qd0, phi_t))
 
 
-def _offer(what: str, made: Assembled, off: Array, group: Variables, near: Array | None) -> str:
+def _offer(
+    what: str, made: PreparedMechanism, off: Array, group: Variables, near: Array | None
+) -> str:
     """Return the message about the largest entry of `off`.
 
     The message offers the consistent values `near` for the variables in `group`.
@@ -199,7 +203,7 @@ def _offer(what: str, made: Assembled, off: Array, group: Variables, near: Array
 
 
 def _undetermined(
-    made: Assembled, rows: Iterable[tuple[str, ca.SX]], free: Array
+    made: PreparedMechanism, rows: Iterable[tuple[str, ca.SX]], free: Array
 ) -> tuple[str, ...]:
     """Return the joints whose `rows` depend on the combinations `free` of the multipliers."""
     pairs = [(name, ca.vec(row)[i]) for name, row in rows for i in range(row.numel())]
@@ -211,7 +215,7 @@ def _undetermined(
 
 
 def _fixed_already(
-    made: Assembled, constraints: Sequence[Constraint], free: Array
+    made: PreparedMechanism, constraints: Sequence[Constraint], free: Array
 ) -> Iterator[str]:
     """Yield messages about constraints in time with multipliers in the combinations `free`.
 
@@ -230,7 +234,9 @@ def _fixed_already(
                 )
 
 
-def in_absolute_coordinates(tree: Assembled, constraints: Sequence[Constraint]) -> Assembled:
+def in_absolute_coordinates(
+    tree: PreparedMechanism, constraints: Sequence[Constraint]
+) -> PreparedMechanism:
     """Return the equations of the mechanism in absolute coordinates, with the same start."""
     kin = tree.eq.kin
     starts: dict[str, tuple[tuple[float, ...], tuple[float, ...]]] = {}
@@ -255,7 +261,7 @@ def in_absolute_coordinates(tree: Assembled, constraints: Sequence[Constraint]) 
     return written(topology, tree.eq.forces, constraints, tree.p, tree.u)
 
 
-def without_friction(made: Assembled) -> tuple[Array, Array, Array]:
+def without_friction(made: PreparedMechanism) -> tuple[Array, Array, Array]:
     """Return the accelerations, multipliers and normal forces at the start without friction."""
     eq = made.eq
     unknowns = ca.vertcat(eq.a, eq.lam)
@@ -265,8 +271,8 @@ def without_friction(made: Assembled) -> tuple[Array, Array, Array]:
     zero.append(ca.SX.ones(eq.N.numel()))
     expressions = [ca.vertcat(eq.balance, eq.phi_ddot), stacked(eq.normals)]
     rows, normals = ca.substitute(expressions, symbols, zero)
-    own = not eq.m and not ca.depends_on(eq.mass, ca.vertcat(*symbols))
-    slopes = eq.mass if own else ca.jacobian(rows, unknowns)
+    is_mass = not eq.m and not ca.depends_on(eq.mass, ca.vertcat(*symbols))
+    slopes = eq.mass if is_mass else ca.jacobian(rows, unknowns)
     arguments = [unknowns, eq.q, eq.qd, symbols_of(made.p)]
     solve = ca.Function("start", arguments, [rows, slopes, normals])
     at = made.q0, made.qd0, ca.DM(starts_of(made.p))
@@ -275,7 +281,7 @@ def without_friction(made: Assembled) -> tuple[Array, Array, Array]:
     return x[: eq.n], x[eq.n :], solve(x, *at)[2].full().ravel()
 
 
-def with_cuts(made: Assembled) -> Equations | None:
+def with_cuts(made: PreparedMechanism) -> Equations | None:
     """Return the equations with cuts; None if cuts do not save operations.
 
     Cuts save operations in long open chains.

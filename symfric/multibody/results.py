@@ -140,8 +140,8 @@ def constraint_units(units: list[str]) -> tuple[str, str, str]:
 
 SPRING, DAMPER, STRUT = (Symbol(line=line, anchored=True) for line in ("spring", "damper", "strut"))
 SPIRAL, LINK = Symbol(line="spiral"), Symbol(line="link")
-FORWARD = {"slide": (0.0, 0.0, 1.0), "x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0)}
-"""Directions of joints in the axes of a frame, if they are not about z."""
+AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0)}
+"""Directions of joints in the axes of a frame; all others are along or about z."""
 
 
 def sketch(eq: Equations, scales: Mapping[str, float]) -> Sketch:
@@ -154,29 +154,26 @@ def sketch(eq: Equations, scales: Mapping[str, float]) -> Sketch:
     kin = eq.kin
     bodies, joints = kin.topology.bodies, kin.topology.joints.values()
     springs = [f for f in eq.forces if isinstance(f, SpringDamper)]
-    held = {place for joint in joints for place in (joint.parent, joint.child)}
+    ends = [place for joint in joints for place in (joint.parent, joint.child)]
     pulled = [place for force in springs for place in force.places()]
     named = (f"{body}.{frame}" for body, b in bodies.items() for frame in b.frames if frame)
-    ends = (place for joint in joints for place in (joint.parent, joint.child))
     used = {place: k for k, place in enumerate(dict.fromkeys((*ends, *named, *pulled)))}
     columns = [_column(kin.motion[body_of(p)], kin.frame(p).R, kin.frame(p).p) for p in used]
     parts: list[Part] = []
     for name, motion in kin.motion.items():
         own = [(place, k) for place, k in used.items() if body_of(place) == name]
-        corners = tuple(k for place, k in own if place in held or place not in pulled)
-        far = tuple(k for place, k in own if place not in held and place in pulled)
+        corners = tuple(k for place, k in own if place in ends or place not in pulled)
+        far = tuple(k for place, k in own if place not in ends and place in pulled)
         mass = _amount(bodies[name].mass, "kg")
         parts.append(Part(name, len(columns), corners, far, name == GROUND, mass))
         columns.append(_column(motion, ca.SX.eye(3), bodies[name].c))
     marks: list[Mark] = []
     for joint in joints:
-        slips = ((c.name, scales[c.name]) for c in eq.contacts
-                 if c.part == joint.name and c.name in scales)  # fmt: skip
-        slips = tuple((f"{name}_slip", scale) for name, scale in slips)
-        mark = _mark(joint.name, joint.symbol, (joint.parent, joint.child), used, slips)
+        mark = _mark(joint.name, joint.symbol, (joint.parent, joint.child), used)
         rubs = tuple(c.name for c in eq.contacts if c.part == joint.name)
+        slips = tuple((f"{name}_slip", scales[name]) for name in rubs if name in scales)
         label = joint.name if joint.symbol.line else ""
-        marks.append(replace(mark, contacts=rubs, label=label))
+        marks.append(replace(mark, slips=slips, contacts=rubs, label=label))
     for force in springs:
         mark = _mark(force.name, _springy(force), (force.a, force.b), used)
         label = _amounts(force, "N/m", "N s/m") or force.name
@@ -228,7 +225,7 @@ def _arrows(eq: Equations, used: Mapping[str, int]) -> Iterator[Arrow]:
         for direction, k in joint.directions.items():
             frame = b if isinstance(joint, Universal) and direction == "y" else a
             turning = not joint.linear(direction)
-            axis = FORWARD.get(direction, (0.0, 0.0, 1.0))
+            axis = AXES.get(direction, (0.0, 0.0, 1.0))
             name = joint.coordinate(k)
             yield Arrow((name, f"{name}_rate"), b, frame, axis, turning)
             for push in pushes:
@@ -244,20 +241,14 @@ def _amount(value: Scalar, unit: str) -> str:
     return str(value) if ca.SX(value).is_symbolic() else ""
 
 
-def _mark(
-    name: str,
-    symbol: Symbol,
-    ends: tuple[str, str],
-    used: Mapping[str, int],
-    slips: tuple[tuple[str, float], ...] = (),
-) -> Mark:
+def _mark(name: str, symbol: Symbol, ends: tuple[str, str], used: Mapping[str, int]) -> Mark:
     """Return a mark; if possible, its first end is the end that is on the ground."""
     grounded = GROUND in (body_of(end) for end in ends[: 1 if symbol.slot else 2])
     if grounded and body_of(ends[0]) != GROUND and symbol.turnable:
         ends = ends[1], ends[0]
-    return Mark(name, symbol, used[ends[0]], used[ends[1]], slips, grounded)
+    return Mark(name, symbol, used[ends[0]], used[ends[1]], grounded=grounded)
 
 
 def _column(motion: Motion, R: ca.SX, offset: ca.SX) -> ca.SX:
     """Return the axes and the position of a place on a body, shape (12, 1)."""
-    return ca.densify(ca.vertcat(ca.vec(motion.R @ R), motion.point(offset)[0]))
+    return ca.densify(ca.vertcat(ca.vec(motion.R @ R), motion.place(offset)))

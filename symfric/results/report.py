@@ -20,8 +20,7 @@ from symfric.foundation.parameters import Parameter, parameters
 from symfric.foundation.shown import data_uri
 from symfric.foundation.style import COLOURS
 from symfric.page import html
-from symfric.page.svg import Polyline as Line
-from symfric.page.svg import around, chart
+from symfric.page.svg import Polyline, around, chart
 from symfric.results.kinds import is_mechanism, norms
 from symfric.results.trajectory import Trajectory
 
@@ -116,11 +115,11 @@ def _friction(runs: Mapping[str, Trajectory]) -> Iterator[str]:
         name = "friction" if contact.bare else f"{contact.name}_friction"
         if not all(name in run.units for run in runs.values()):
             continue
-        curves: list[Line] = []
+        curves: list[Polyline] = []
         for k, (label, run) in enumerate(runs.items()):
             own = next(c for c in run.model.contacts if c.name == contact.name)
             slip = run.of(own.slip, run.looks)
-            curves.append(Line(f"run{k % len(COLOURS)}", slip, run.at_looks(name), label))
+            curves.append(Polyline(f"run{k % len(COLOURS)}", slip, run.at_looks(name), label))
         for start in range(0, len(curves), LINES):
             shown = curves[start : start + LINES]
             slips, forces = [c.x for c in shown], [c.y for c in shown]

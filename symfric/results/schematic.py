@@ -1,4 +1,4 @@
-"""Labelled schematic of a machine: bodies, elements, positive directions, and where it rubs."""
+"""Labelled schematic of a machine: bodies, elements, positive directions, and friction contacts."""
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
@@ -79,6 +79,7 @@ def schematic(model: Model, path: str | Path | None = None) -> Figure:
 
     Names of bodies and elements are black, coordinates, velocities and given forces with their
     positive directions blue, inputs green, and contacts with friction and their loads orange.
+    Labels for which no place is free are omitted.
 
     Raises:
         ValueError: the model has no sketch.
@@ -268,13 +269,16 @@ def _filled(lines: Sequence[Array]) -> Array:
 
 
 def _written(axes: Any, labels: Sequence[Label], lines: Array, page: Page) -> bool:
-    """Write the labels where they cover each other nowhere and lines least; True if all fit."""
+    """Write the labels apart from each other and off the lines, and return True if all fit.
+
+    Labels for which no place is free are omitted.
+    """
     figure = axes.figure
     renderer, pt = FigureCanvasAgg(figure).get_renderer(), 72 / figure.dpi
     u = _circle(0.0, 2 * np.pi)[:-1:2]
     away = np.concatenate([r * u for r in RADII])
     u = np.tile(u, (len(RADII), 1))
-    paper, taken = np.array([WIDTH, page.height]), np.empty((0, 4))
+    paper, taken, fit = np.array([WIDTH, page.height]), np.empty((0, 4)), True
     for text, at, colour in labels:
         written = axes.text(0, 0, text, fontsize=TEXT, color=colour, ha="center", va="center")
         box = written.get_window_extent(renderer)
@@ -285,7 +289,9 @@ def _written(axes: Any, labels: Sequence[Label], lines: Array, page: Page) -> bo
         for other in taken:
             free &= ((low >= other[2:]) | (high <= other[:2])).any(axis=1)
         if not free.any():
-            return False
+            written.remove()
+            fit = False
+            continue
         kept = np.flatnonzero(free)
         inside = (lines > low[kept, None]) & (lines < high[kept, None])
         leaders = at + np.linspace(0.0, 1.0, 8)[:, None, None] * away[kept]
@@ -300,4 +306,4 @@ def _written(axes: Any, labels: Sequence[Label], lines: Array, page: Page) -> bo
         lines = np.vstack([lines, np.linspace(at, at + away[k], 8)])
         if np.linalg.norm(away[k]) > RADII[3]:
             axes.plot(*np.array([at, at + away[k]]).T, color=colour, linewidth=0.4, alpha=0.6)
-    return True
+    return fit

@@ -27,7 +27,7 @@ DIRECTIONS = {"y": (1.0, 0.0, 0.0), "z": (0.0, 1.0, 0.0), "x": (0.0, 0.0, 1.0)}
 @final
 @dataclass(frozen=True, eq=False)
 class RailBody:
-    """Body on a rail in a drawing.
+    """Body or contact in a drawing, on a rail or not.
 
     Attributes:
         x, z: position [m], expressions of the model.
@@ -89,9 +89,8 @@ def drawn(
             start = place(*((0, block.z) if block.along == "x" else (block.x, 0)), block.along)
             marks.append(Mark(name, RAIL, start, at[name], _slips(block), True, _contacts(block)))
     for line, a, b, symbols in links:
-        marks.append(
-            Mark(f"{a}_{b}", LINES[line], at[a], at[b], (), a in (fixed or {}), (), symbols)
-        )
+        grounded = a in (fixed or {})
+        marks.append(Mark(f"{a}_{b}", LINES[line], at[a], at[b], grounded=grounded, label=symbols))
     for name, (angle, length) in (hands or {}).items():
         centre = place(0, 0)
         tip = place(length * ca.sin(angle), length * ca.cos(angle))

@@ -203,7 +203,7 @@ class DrillString(Scene):
     def _sketch(self, phi: ca.SX, twists: ca.SX) -> Sketch:
         """Return hands of bit and top drive as seen from above, with the twist between them.
 
-        In a schematic, the string is seen from aside.
+        In a schematic, the string is seen from the side.
         """
         hands = {"bit": (phi, 0.7), "top": (phi + ca.sum1(twists), 1.0)}
         hub = RailBody(0.0, 0.0, "", "v_rel", self.law, contact="rock")

@@ -112,11 +112,13 @@ class SmoothPiece:
 
     def __init__(self, asked: Question, a: float, b: float) -> None:
         force = asked.signal.between(a, b)
+        self.asked, self.span = asked, (a, b)
         self.scene: RefereeScene = SCENES[asked.scene](asked.p, force, (a + b) / 2)
         self.rub = partial(LAWS[asked.law], asked.p, asked.forms)
         self.count = int(asked.law in DYNAMIC)
         self.by_modes = asked.law == "exact_coulomb"
         self.loads = [(0.0, 0.0)] * len(self.scene.slides)
+        self.longest = (asked.times[-1] - asked.times[0]) / PIECES  # longest step [s]
         self.calls = 0
 
     def __call__(self, t: float, y: Sequence[float]) -> list[float]:
@@ -173,32 +175,24 @@ def solve(asked: Question, rtol: float = 1e-10) -> Array:
         motion = SmoothPiece(asked, a, b)
         here = (asked.times >= a) & (asked.times <= b)
         way = by_events if motion.by_modes else by_lsoda
-        states, y = way(motion, y, asked.times[here], (a, b), rtol, asked)
+        states, y = way(motion, y, asked.times[here], rtol)
         found[:, here] = states
     if not np.isfinite(found).all():
         raise GaveUpError("not finite")
     return found
 
 
-def by_lsoda(
-    motion: SmoothPiece,
-    y: Array,
-    times: Array,
-    span: tuple[float, float],
-    rtol: float,
-    asked: Question,
-) -> tuple[Array, Array]:
+def by_lsoda(motion: SmoothPiece, y: Array, times: Array, rtol: float) -> tuple[Array, Array]:
     """Return states at `times` and at the end, integrated by LSODA."""
     from scipy.integrate import odeint  # noqa: PLC0415  (slow to import)
 
-    at = np.unique([*span, *times])  # LSODA needs times that differ by more than rounding
+    at = np.unique([*motion.span, *times])  # LSODA needs times that differ by more than rounding
     at = at[np.append(True, np.diff(at) > CLOSE * np.abs(at).max())]
-    longest = (asked.times[-1] - asked.times[0]) / PIECES
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the error message repeats the warning
         states, info = odeint(
-            motion, y, at, rtol=rtol, atol=1e-3 * rtol * asked.scale, tcrit=[span[1]],
-            tfirst=True, mxstep=10 * EVALUATIONS, hmax=longest, full_output=True,
+            motion, y, at, rtol=rtol, atol=1e-3 * rtol * motion.asked.scale, tcrit=[motion.span[1]],
+            tfirst=True, mxstep=10 * EVALUATIONS, hmax=motion.longest, full_output=True,
         )  # fmt: skip
     if info["message"] != "Integration successful.":
         raise GaveUpError(info["message"])
@@ -206,28 +200,23 @@ def by_lsoda(
     return states[nearest].T, states[-1]
 
 
-def by_events(
-    motion: SmoothPiece,
-    y: Array,
-    times: Array,
-    span: tuple[float, float],
-    rtol: float,
-    asked: Question,
-) -> tuple[Array, Array]:
+def by_events(motion: SmoothPiece, y: Array, times: Array, rtol: float) -> tuple[Array, Array]:
     """Return states at `times` and at the end, integrated from event to event."""
     from scipy.integrate import solve_ivp  # noqa: PLC0415  (slow to import)
 
-    contacts, mu_s, (t, end) = range(len(motion.scene.slides)), asked.p["mu_s"], span
-    longest = (asked.times[-1] - asked.times[0]) / PIECES
+    asked, (t, end) = motion.asked, motion.span
+    contacts, mu_s = range(len(motion.scene.slides)), asked.p["mu_s"]
     found, y = np.empty((y.size, times.size)), y.copy()
     for i in contacts:
         if y[motion.mode(i)] == 0.0:
             y = motion.held(t, y, i, mu_s)
     for _ in range(EVENTS):
-        ends = [ending(motion, i, y[motion.mode(i)], mu_s, t + 1e-9 * longest) for i in contacts]
+        ends = [
+            ending(motion, i, y[motion.mode(i)], mu_s, t + 1e-9 * motion.longest) for i in contacts
+        ]
         done: Any = solve_ivp(
             motion, (t, end), y, method="LSODA", rtol=rtol, atol=1e-3 * rtol * asked.scale,
-            max_step=longest, dense_output=True, events=ends,
+            max_step=motion.longest, dense_output=True, events=ends,
         )  # fmt: skip
         if not done.success:
             raise GaveUpError(done.message)

@@ -73,15 +73,33 @@ def test_steps_in_the_browser_are_those_of_python(name, page):
         assert not misses(found, in_python(block.step, rows), 1e-12).any(), model
 
 
+def show(page, name: str, folder: Path) -> None:
+    """Open the sliders of a law."""
+    text = written(name, ALL_LAWS[name]()).replace("../_static", ".")
+    for path in SHARED:
+        (folder / path.name).write_text(path.read_text("utf-8"), "utf-8")
+    head = "<!DOCTYPE html><meta charset=utf-8><link rel=stylesheet href=sliders.css>"
+    (folder / "page.html").write_text(f"{head}{text}", "utf-8")
+    page.goto((folder / "page.html").as_uri())
+
+
+@needs_browser
+@pytest.mark.parametrize(
+    ("mu_d", "said"),
+    [("Home", "halving the step changes the curve by 0 of the peak."),
+     ("End", "halving the step changes the curve by")],
+)  # fmt: skip
+def test_a_force_of_zero_is_exact(page, tmp_path: Path, mu_d, said):
+    show(page, "coulomb", tmp_path)
+    page.locator("[data-name=lawmu_d]").press(mu_d)
+    page.wait_for_selector("[data-compared=true]")
+    assert said in page.locator("[data-figure=loop] figcaption").inner_text()
+
+
 @needs_browser
 def test_sliders_move_the_curves(page, tmp_path: Path):
     law = LuGre()
-    text = written("lugre", law).replace("../_static", ".")
-    for path in SHARED:
-        (tmp_path / path.name).write_text(path.read_text("utf-8"), "utf-8")
-    head = "<!DOCTYPE html><meta charset=utf-8><link rel=stylesheet href=sliders.css>"
-    (tmp_path / "page.html").write_text(f"{head}{text}", "utf-8")
-    page.goto((tmp_path / "page.html").as_uri())
+    show(page, "lugre", tmp_path)
     curves = page.locator(".curve")
 
     def shown() -> list[str]:
@@ -117,6 +135,13 @@ def test_sliders_move_the_curves(page, tmp_path: Path):
     exact = simulate(Rabinowicz(law).model(), 20.0, t_eval=t, rtol=1e-9)["x"]
     off = np.abs(np.array(rows) - exact).max() / np.abs(exact).max()
     assert off == pytest.approx(error, rel=0.05) and off < 1e-5
+
+
+@pytest.mark.parametrize("name", ["lugre", "steady_state_lugre", "quarter_car_simple"])
+def test_the_block_sticks_and_slides(name):
+    """The block moves with the belt for 2 s; its spring then reaches less than 1.5 m of 2 m."""
+    x = simulate(sliders.belt(ALL_LAWS[name]()), 20.0, t_eval=[2.0, 20.0])["x"]
+    assert x[0] == pytest.approx(0.2, rel=0.05) and x[1] < 1.5
 
 
 @pytest.mark.parametrize(

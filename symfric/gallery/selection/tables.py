@@ -229,10 +229,10 @@ def _row(machine: Machine, name: str, first: bool) -> PaperRow:
 
 def _measured(machine: Machine, name: str, law: Law, T: float, S: float) -> PaperRow:
     model = machine.model(law)
-    task = Requirements(
+    required = Requirements(
         machine, OWN, (), {"": Friction()}, None, EQUAL, 0.05, own=True, fixed=True, work=WORK,
     )  # fmt: skip
-    row: RankedLaw = measured(task, name, law)
+    row: RankedLaw = measured(required, name, law)
     t = np.linspace(0.0, machine.t_end, SAMPLES)
     run = simulate(model, machine.t_end, rtol=1e-6, t_eval=t, backend="vm")
     peer, steps = _peer(model, machine.t_end)

@@ -17,7 +17,7 @@ from symfric.foundation.status import Status
 from symfric.integrator.equations.initial import consistent_many, smallest_step
 from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.many.members import Program, Runner, Stretch, with_code
-from symfric.integrator.methods.attempt import Given, SRow
+from symfric.integrator.methods.attempt import RRow, SRow
 from symfric.integrator.methods.method import Method
 from symfric.integrator.running.events import Stop
 from symfric.integrator.running.integrator import Integrator, built
@@ -140,7 +140,7 @@ class Job:
             last = last[small]
             scale[last] = own[small]
             those = chunk[last]
-            those.R[:, Given.atol(nominal.size)] *= scale[last] / nominal
+            those.R[:, RRow.atol(nominal.size)] *= scale[last] / nominal
             again = self._solved(those, run)
             better = np.array([m not in again.failed for m in range(last.size)])
             last, size = last[better], again.size[better]
@@ -213,7 +213,7 @@ class Job:
 
 def _data(chunk: Chunk, members: Indices, interval: int, nx: int) -> Array:
     """Return the run data of members in an input interval."""
-    d = chunk.R[members, Given.d(nx)]
+    d = chunk.R[members, RRow.d(nx)]
     data = chunk[members].data[:, :, interval]
     d[:, d.shape[1] - data.shape[1] :] = data
     return d
@@ -285,7 +285,7 @@ class SingleJob:
         for m, end in enumerate(chunk.ends.tolist()):
             own = self._inputs(chunk.data[m % chunk.data.shape[0]], end)
             looks = times[times <= end] if times.size else chunk.ends[m : m + 1]
-            y0, p = chunk.S[m, SRow.Y].copy(), chunk.R[m, Given.d(nx)][: len(self.model.p)].copy()
+            y0, p = chunk.S[m, SRow.Y].copy(), chunk.R[m, RRow.d(nx)][: len(self.model.p)].copy()
             try:
                 allowed = watchful(self.tolerances, integrator, own)
                 run, _ = integrate(integrator, own, y0, p, allowed, self.backend, None, looks)

@@ -22,7 +22,7 @@ from symfric.integrator.equations.blocks import Following
 from symfric.integrator.equations.initial import ASSEMBLED, FLOOR, ITERATIONS, AlgebraicEquations
 from symfric.integrator.equations.manifold import Manifold
 from symfric.integrator.many.vectors import c_text, lanes_header, vector_source
-from symfric.integrator.methods.attempt import Given, SRow
+from symfric.integrator.methods.attempt import RRow, SRow
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.plants import MEMBERS, Advance, Plants, Why, compiled, loaded
 
@@ -192,7 +192,7 @@ def loop_sizes(
     n = step.numel_in(0) - SRow.MEMORY
     return {
         "N": n, "MEMORY": SRow.MEMORY, "T": SRow.T, "H": SRow.H, "SIZE_R": step.numel_in(1),
-        "T_END": Given.T_END, "N_D": signals.numel_in(2), "ROWS": step.numel_out(1) // n,
+        "T_END": RRow.T_END, "N_D": signals.numel_in(2), "ROWS": step.numel_out(1) // n,
         "SIGNALS": signals.numel_out(0), "FLOOR": repr(FLOOR),
         "FOLLOWS": 0 if not follows else 1 if follow is None else 2,
     }  # fmt: skip

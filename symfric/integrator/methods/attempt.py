@@ -65,7 +65,7 @@ class SRow:
 
 
 @final
-class Given:
+class RRow:
     """Rows of R: end time, relative tolerance, longest step, absolute tolerances, run data."""
 
     T_END, RTOL, H_MAX = range(3)
@@ -79,19 +79,19 @@ class Given:
     @staticmethod
     def fill(R: Array, t_end: float, rtol: float, h_max: float, atol: Array, d: Array) -> None:
         """Fill R in place, as `of` does."""
-        R[: Given.FIXED] = t_end, rtol, h_max
-        first = Given.FIXED + atol.size
-        R[Given.FIXED : first], R[first:] = atol, d
+        R[: RRow.FIXED] = t_end, rtol, h_max
+        first = RRow.FIXED + atol.size
+        R[RRow.FIXED : first], R[first:] = atol, d
 
     @staticmethod
     def atol(nx: int) -> slice:
         """Return the slice of the absolute tolerances of `nx` states."""
-        return slice(Given.FIXED, Given.FIXED + nx)
+        return slice(RRow.FIXED, RRow.FIXED + nx)
 
     @staticmethod
     def d(nx: int) -> slice:
         """Return the slice of the run data after the tolerances of `nx` states."""
-        return slice(Given.FIXED + nx, None)
+        return slice(RRow.FIXED + nx, None)
 
 
 def _joined(common: list[float], own: Array) -> Array:
@@ -300,10 +300,10 @@ def build_step(system: System, method: Method, kind: Any = ca.SX) -> ca.Function
     """
     n, nx = system.n, system.nx
     S = kind.sym("S", SRow.MEMORY + n)
-    R = kind.sym("R", Given.FIXED + nx + system.d.numel())
+    R = kind.sym("R", RRow.FIXED + nx + system.d.numel())
     t, h_wish, h_old, growth_old, rejected = (S[i] for i in range(SRow.MEMORY))
-    t_end, rtol, h_max = (R[i] for i in range(Given.FIXED))
-    y, atol, d = S[SRow.Y], R[Given.atol(nx)], R[Given.d(nx)]
+    t_end, rtol, h_max = (R[i] for i in range(RRow.FIXED))
+    y, atol, d = S[SRow.Y], R[RRow.atol(nx)], R[RRow.d(nx)]
 
     left = t_end - t
     h = ca.fmax(ca.fmin(h_wish, left), 1e-300)

@@ -2,7 +2,7 @@
 
 Rosenbrock methods have linearly implicit stages and one factorisation per step. Backward Euler is
 solved by Newton's method, for plants in fixed steps. The others have no iteration matrix. Radau IIA
-is in `radau.py`.
+is in `tableaux.py`.
 """
 
 from dataclasses import dataclass

@@ -80,7 +80,7 @@ class ContactModes:
             rows.append(ca.vertcat(up, down, rate_of(ca.SX(c.slip), model), ca.SX(c.slip)))
             slope = ca.DM(ca.jacobian(ca.SX(c.slip), x).sparsity(), 1).full()[0] != 0
             still.append(STILL * max(nominal[slope], default=1.0))
-        every = stacked(rows) if model.holonomic else by_laws(model)(stacked(rows))
+        every = stacked(rows) if model.holonomic else by_laws(model, stacked(rows))
         look = of_time("symfric_contacts", ca.densify(every))
         return ContactModes(contacts, look, np.array(still))
 

@@ -68,9 +68,9 @@ def doubts(
     if not run.status.ok:
         return []
     found = list[UserWarning]()
-    for held in places(integrator.model):
-        if (most := held.bound(run, p)) > 1 + MARGIN:
-            texts = _overloads(held, most, integrator, inputs, run, p)
+    for carried in places(integrator.model):
+        if (most := carried.bound(run, p)) > 1 + MARGIN:
+            texts = _overloads(carried, most, integrator, inputs, run, p)
             found += [OverloadWarning(text) for text in texts]
     for sliding in sliding_places(integrator.model):
         if sliding.suspect(p):
@@ -99,7 +99,7 @@ def _determined(model: Model, write: Callable[[], list[Any]]) -> ca.SX | None:
     try:
         found = ca.vertcat(*write())
         if ca.depends_on(found, stacked(c.force for c in model.contacts)):
-            found = by_laws(model)(found)
+            found = by_laws(model, found)
     except (ValueError, TypeError, NotImplementedError):
         return None
     known = ca.vertcat(model.t, *(model.vector(letter) for letter in "xzup"))
@@ -137,17 +137,18 @@ def _gains(
     sliding: Sliding, integrator: Integrator, inputs: InputData, run: RunRecord, p: Array
 ) -> Iterator[str]:
     """Yield a message about a contact whose friction adds energy to the motion."""
-    (t, y), contact = run.seen, sliding.contact
+    (t, y), contact, memory = run.seen, sliding.contact, integrator.model.memory
     name, unit = f"sliding '{contact.name}'", contact.unit
 
     def slip_and_forces() -> list[Any]:
         steady = _steady(contact, contact.slip, contact.N, contact.given)
         return [contact.slip, contact.friction, steady]
 
-    rows = _determined(integrator.model, slip_and_forces)
-    if rows is None:
+    if name not in memory:
+        memory[name] = _determined(integrator.model, slip_and_forces)
+    if memory[name] is None:
         return
-    slip, force, steady = _over_time(integrator, inputs, name, rows, t, y, p)
+    slip, force, steady = _over_time(integrator, inputs, name, memory[name], t, y, p)
     power, worst = force * slip, int(np.argmin(steady * slip))
     work, turnover = (np.diff(t) @ (w[1:] + w[:-1]) / 2 for w in (power, np.abs(power)))
     if steady[worst] * slip[worst] < 0 and work < -SHARE * turnover:
@@ -238,7 +239,7 @@ class CarriedForce:
 
 
 def _overloads(
-    held: CarriedForce,
+    carried: CarriedForce,
     most: float,
     integrator: Integrator,
     inputs: InputData,
@@ -246,28 +247,28 @@ def _overloads(
     p: Array,
 ) -> Iterator[str]:
     """Yield a message about a contact whose force exceeds its level, by `most` at most."""
-    (t, y), fixed = run.seen, held.screen is not None
+    (t, y), fixed = run.seen, carried.screen is not None
     if not fixed:
-        k = _peaks(y[:, held.rows])
+        k = _peaks(y[:, carried.rows])
         t, y = t[k], y[k]
-    name = f"held '{held.contact.name}'"
-    force, level, growth = _over_time(integrator, inputs, name, held.watched, t, y, p)
+    name = f"held '{carried.contact.name}'"
+    force, level, growth = _over_time(integrator, inputs, name, carried.watched, t, y, p)
     ratio = np.abs(force) / np.where(level > 0, level, np.inf)
     start = max(1.0, ratio[0])  # the start value may exceed the level
     allowed = (1 + (MARGIN if fixed else WIDE)) * start
     ratio = ratio if fixed else np.where(growth > 0, ratio, 0.0)
     k = int(ratio.argmax())
     if ratio[k] > allowed:
-        yield overload(held, ratio[k], f" at t = {t[k]:.6g} s")
+        yield overload(carried, ratio[k], f" at t = {t[k]:.6g} s")
     elif fixed and most > allowed and not run.complete:  # overload between result times
-        yield overload(held, most)
+        yield overload(carried, most)
 
 
-def overload(held: CarriedForce, ratio: float, when: str = "") -> str:
+def overload(carried: CarriedForce, ratio: float, when: str = "") -> str:
     """Return the message about friction that is `ratio` times its level."""
-    law = type(held.contact.law).__name__
+    contact, law = carried.contact.name, type(carried.contact.law).__name__
     return (
-        f"In contact '{held.contact.name}' {law} carries {ratio:.3g} times its static level{when}: "
+        f"In contact '{contact}' {law} carries {ratio:.3g} times its static level{when}: "
         "its states do not relax, so this friction is not that of the law; give a smaller v_eps, "
         "or a softer bristle, which creeps faster than v_eps and than velocities are rounded."
     )
@@ -276,11 +277,11 @@ def overload(held: CarriedForce, ratio: float, when: str = "") -> str:
 def places(model: Model) -> tuple[CarriedForce, ...]:
     """Return the contacts of a model whose law sticks through its states."""
     if "held" not in model.memory:
-        model.memory["held"] = tuple(h for c in model.contacts if (h := _held(model, c)))
+        model.memory["held"] = tuple(h for c in model.contacts if (h := _carried(model, c)))
     return model.memory["held"]
 
 
-def _held(model: Model, contact: Contact) -> CarriedForce | None:
+def _carried(model: Model, contact: Contact) -> CarriedForce | None:
     """Return the force that the states of a contact carry; None if force or level are unknown."""
     if not contact.states or APPLIED in contact.given:
         return None
@@ -319,11 +320,11 @@ def of_members(
         given: states with start values of the user, which may have any size.
     """
     found: dict[int, str] = {}
-    for held in places(model):
-        own = [v.name for v in held.contact.states]
-        if held.screen is None or not set(own).isdisjoint(given):
+    for carried in places(model):
+        own = [v.name for v in carried.contact.states]
+        if carried.screen is None or not set(own).isdisjoint(given):
             continue
         ends = (np.array([reach[name][k] for name in own]) for k in (0, 1))
-        ratio = np.fmax(*(held.ratios(held.screen, end, p.T) for end in ends))
-        found |= {int(m): overload(held, ratio[m]) for m in np.flatnonzero(ratio > 1 + MARGIN)}
+        ratio = np.fmax(*(carried.ratios(carried.screen, end, p.T) for end in ends))
+        found |= {int(m): overload(carried, ratio[m]) for m in np.flatnonzero(ratio > 1 + MARGIN)}
     return found

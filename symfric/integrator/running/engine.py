@@ -22,7 +22,7 @@ from symfric.integrator.compiled.columns import filled
 from symfric.integrator.compiled.compiler import load
 from symfric.integrator.equations.blocks import Following
 from symfric.integrator.equations.initial import FLOOR, SURE
-from symfric.integrator.methods.attempt import GROWTH_MEMORY, Given, SRow
+from symfric.integrator.methods.attempt import GROWTH_MEMORY, RRow, SRow
 from symfric.integrator.running import crossings as limits
 from symfric.integrator.running.contact_modes import TURNING, ContactModes
 from symfric.integrator.running.crossings import LOOKS, Crossings
@@ -108,7 +108,7 @@ class Work:
     def enter(self, interval: int) -> None:
         """Start an input interval: set its end and its data."""
         self.loop.interval = interval
-        self.R[Given.T_END] = self.breaks[interval + 1]
+        self.R[RRow.T_END] = self.breaks[interval + 1]
         if self.data.shape[0]:
             self.R[-self.data.shape[0] :] = self.data[:, interval]
 
@@ -154,7 +154,7 @@ class VmEngine:
         except IndexError:
             batch = _Batch(self.step, size)
         S, R, events, h_min = work.S, work.R, work.events, work.loop.h_min
-        S_out, D, t_end = batch.S_out, batch.D, R[Given.T_END]
+        S_out, D, t_end = batch.S_out, batch.D, R[RRow.T_END]
         batch.R[:] = R
         surely = max(h_min, FLOOR * max(abs(t_end), abs(S[SRow.T])))
         found, count, made, request = list[Array](), 0, 0, None
@@ -299,7 +299,7 @@ def c_source(
     n, given = step.numel_in(0) - SRow.MEMORY, step.numel_in(1)
     attempts = filled(
         FOLDER / "attempts.c", *called,
-        n=n, memory=SRow.MEMORY, t=SRow.T, h=SRow.H, t_end=Given.T_END, given=given,
+        n=n, memory=SRow.MEMORY, t=SRow.T, h=SRow.H, t_end=RRow.T_END, given=given,
         width=Record(n, dense_rows).width, dense=2 + 2 * n, dense_rows=dense_rows, floor=FLOOR,
         jump=crossings.width if crossings else 0, searches=int(crossings is not None),
     )  # fmt: skip
@@ -366,7 +366,7 @@ def search_source(crossings: Crossings, given: int, *, decides: bool = True) -> 
         looks=len(LOOKS) - 1, at_looks=", ".join(map(repr, LOOKS)), kept=limits.KEPT,
         alike=limits.ALIKE, finer=limits.FINER, sharper=limits.SHARPER, soon=limits.SOON,
         straight=limits.STRAIGHT, restart=limits.RESTART, least=limits.LEAST, sure=SURE,
-        growth=GROWTH_MEMORY, memory=SRow.MEMORY, d=given - crossings.data, h_max=Given.H_MAX,
+        growth=GROWTH_MEMORY, memory=SRow.MEMORY, d=given - crossings.data, h_max=RRow.H_MAX,
     )  # fmt: skip
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from symfric.foundation.numeric import Array, Buffered, bound
 from symfric.integrator.equations.initial import SURE
-from symfric.integrator.methods.attempt import Given, SRow
+from symfric.integrator.methods.attempt import RRow, SRow
 from symfric.integrator.running import crossings as limits
 from symfric.integrator.running.crossings import (
     AT_ONCE,
@@ -182,7 +182,7 @@ class Search:
         found = self._crossing(row, d)
         if found is None:
             self.eventful.steps += 1
-            h = min(float(self.memory[Memory.RESUME]), float(R[Given.H_MAX]))
+            h = min(float(self.memory[Memory.RESUME]), float(R[RRow.H_MAX]))
             self.memory[Memory.RESUME] = 0.0
             if S[SRow.H] >= h:
                 return Change.NOTHING, None

@@ -18,7 +18,7 @@ from symfric.foundation.numeric import Array, bound, evaluate
 from symfric.integrator.compiled.columns import densified, filled
 from symfric.integrator.compiled.compiler import load
 from symfric.integrator.equations.initial import FLOOR, first_step
-from symfric.integrator.methods.attempt import Given, SRow
+from symfric.integrator.methods.attempt import RRow, SRow
 from symfric.integrator.running.engine import FOLDER, Engine, Work, c_source
 from symfric.integrator.running.events import Eventful, Stop
 from symfric.integrator.running.integrator import Integrator
@@ -93,7 +93,7 @@ class Plants:
 
     def first_step(self) -> float:
         """Return the first step [s] to try, that of a run over `SAMPLES` samples."""
-        return min(first_step(SAMPLES * self.dt, self.begin[0]), float(self.R[0, Given.H_MAX]))
+        return min(first_step(SAMPLES * self.dt, self.begin[0]), float(self.R[0, RRow.H_MAX]))
 
     def copy(self) -> "Plants":
         """Return a copy with its own arrays."""
@@ -160,7 +160,7 @@ def loaded(
 
 def plants_source(integrator: Integrator) -> str:
     """Return the C of the step, of the update after a jump, and of the loop around them."""
-    follow, data = integrator.follow, Given.d(integrator.system.nx).start
+    follow, data = integrator.follow, RRow.d(integrator.system.nx).start
     n_d, nu = integrator.system.d.numel(), integrator.inputs.data.numel()
     others = () if follow is None else (follow.round,)
     plants = filled(
@@ -189,7 +189,7 @@ class InPython:
     ) -> None:
         self.integrator, self.plants, self.engine = integrator, plants, engine
         system, step, rows = integrator.system, integrator.step, integrator.tableau.H.shape[0]
-        self.events, self.data = None, Given.d(system.nx)
+        self.events, self.data = None, RRow.d(system.nx)
         if integrator.crossings is not None:
             self.events = Eventful(integrator.crossings, tolerance)
         self.work = Work(system.n, step.numel_in(1), rows, events=self.events)
@@ -222,9 +222,9 @@ class InPython:
     def _takes_over(self, b: int) -> bool:
         """Take over inputs and the next sample time; return False if unknowns could not follow."""
         plants, S, R, ready = self.plants, self.work.S, self.work.R, bool(self.plants.ready[b])
-        plants.count[b] += S[SRow.T] >= R[Given.T_END]
+        plants.count[b] += S[SRow.T] >= R[RRow.T_END]
         plants.made[b] = plants.ready[b] = 0
-        R[Given.T_END] = plants.begin[b] + plants.count[b] * plants.dt
+        R[RRow.T_END] = plants.begin[b] + plants.count[b] * plants.dt
         R[R.size - plants.u.shape[1] :] = plants.u[b]
         if self.events is not None and ready:
             t, y, d = S[SRow.T : SRow.T + 1], S[SRow.Y], R[self.data]
@@ -244,7 +244,7 @@ class InPython:
 
     def _runs(self, b: int) -> int:
         """Make steps and events up to the sample; return the reason to stop."""
-        plants, S, end = self.plants, self.work.S, self.work.R[Given.T_END]
+        plants, S, end = self.plants, self.work.S, self.work.R[RRow.T_END]
         if self.events is not None:
             return self._runs_with(self.events, b)
         made = 0
@@ -276,7 +276,7 @@ class InPython:
                 if closes or not self._follow():
                     return Why.SEARCH
             if stop is Stop.DECIDE:
-                S, d = self.work.S, self.work.R[Given.d(self.integrator.system.nx)].copy()
+                S, d = self.work.S, self.work.R[RRow.d(self.integrator.system.nx)].copy()
                 t, before = float(S[SRow.T]), jumps.before[-1].copy()
                 S[SRow.Y] = self.integrator.decided(t, before, S[SRow.Y].copy(), d)
                 events.decided()
@@ -299,7 +299,7 @@ WHY = {
 
 def looking(integrator: Integrator, plants: Plants, backend: str) -> Callable[[], Array]:
     """Return a function for the signals of all plants at their times, shape (plants, signals)."""
-    S, d = plants.S, plants.R[:, Given.d(integrator.system.nx)]
+    S, d = plants.S, plants.R[:, RRow.d(integrator.system.nx)]
     if len(S) > 1:
         rows = [S[:, SRow.T], S[:, SRow.Y], d]
         return lambda: integrator.signal_columns(rows, backend=backend)[0]

@@ -19,7 +19,7 @@ from symfric.foundation.status import Status
 from symfric.integrator.equations.expressions import pieces
 from symfric.integrator.equations.initial import JammedError, consistent, first_step, smallest_step
 from symfric.integrator.equations.inputs import InputData
-from symfric.integrator.methods.attempt import Given, SRow
+from symfric.integrator.methods.attempt import RRow, SRow
 from symfric.integrator.running.diagnosis import chattering, explain
 from symfric.integrator.running.events import Stop
 from symfric.integrator.running.integrator import Integrator
@@ -93,7 +93,7 @@ class Tolerances:
 
     def given(self, t_end: float, d: Array) -> Array:
         """Return the constant data of an attempt towards `t_end`, for run data d (..., n_d)."""
-        return Given.of(t_end, self.rtol, self.max_step, self.atol, d)
+        return RRow.of(t_end, self.rtol, self.max_step, self.atol, d)
 
 
 def integrate(
@@ -188,7 +188,7 @@ class _March:
             work.events.begin(allowed.event)
         first, work.loop.h_min = _first_and_smallest(t_start, t_end)
         work.begin(t_start, min(first, allowed.max_step), y)
-        Given.fill(work.R, t_end, allowed.rtol, allowed.max_step, self.atol, d)
+        RRow.fill(work.R, t_end, allowed.rtol, allowed.max_step, self.atol, d)
         outputs = Outputs.at(self.times, y.size)
         work.want(outputs)
         work.over(inputs.breaks, inputs.values)
@@ -222,13 +222,13 @@ class _March:
     @property
     def d(self) -> Array:
         """Run data on the current input interval, as a copy."""
-        return self.work.R[Given.d(self.integrator.system.nx)].copy()
+        return self.work.R[RRow.d(self.integrator.system.nx)].copy()
 
     def _march(self, t_start: float, t_end: float) -> None:
         """Integrate over all input intervals."""
         run, model = self.made, self.integrator.model
         if self.events is not None:
-            t, d = self.work.S[SRow.T], self.work.R[Given.d(self.integrator.system.nx)]
+            t, d = self.work.S[SRow.T], self.work.R[RRow.d(self.integrator.system.nx)]
             self.events.started(model.events, self.integrator.events_at(t, self.y, d)[0])
         left, reason = 0.0, Stop.FULL
         while reason is not Stop.END and run.status is Status.SUCCESS:

@@ -290,7 +290,7 @@ class Law(Parametric, ABC):
         return None
 
     def held_rest(self, v: Scalar, N: Scalar, z: Scalar) -> Scalar | None:
-        """Return the equilibrium of each state at constant v, N and other states; None: unknown."""
+        """Return each state's equilibrium at constant v, N and other states; None if unknown."""
         return None
 
     def warnings(self) -> tuple[str, ...]:

@@ -114,7 +114,7 @@ def test_widths_have_exponents_and_layers() -> None:
     assert (steep.number, steep.exponent, steep.layer) == (500.0, -1, 2e-3)
     assert steep.at(0.1) == pytest.approx(10.0)
     assert wide.at(0.1) == pytest.approx(0.1)
-    assert (load.number, load.layer) == (1e-4, None)
+    assert (load.number, load.layer, load.at(0.1)) == (1e-4, None, 1e-4)
     assert [w.parameter for w in widths(drive(laws.LeineSwitch()))] == ["guide_v_eps"]
     assert widths(drive(laws.Viscous())) == ()
 

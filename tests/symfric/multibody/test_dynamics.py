@@ -14,18 +14,20 @@ from symfric.foundation.parameters import Variable
 from symfric.multibody.dynamics import kinetic_energy
 from symfric.multibody.equations import equations
 from symfric.multibody.forces import Force
-from symfric.multibody.prepare import Assembled
+from symfric.multibody.prepare import PreparedMechanism
 from symfric.scenes import MECHANISMS, Arm, FourMass
 
 both_ways = pytest.mark.parametrize("reverse", [False, True])
 
 
 @cache
-def prepared(reverse: bool) -> Assembled:
+def prepared(reverse: bool) -> PreparedMechanism:
     return chain(reverse).prepare()
 
 
-def accelerations(made: Assembled, q: np.ndarray, qd: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def accelerations(
+    made: PreparedMechanism, q: np.ndarray, qd: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Random accelerations that keep Euler parameters of length one, and what they may not move."""
     a, free = np.random.default_rng(4).normal(size=made.eq.n), np.eye(made.eq.n)
     for link in made.eq.kin.topology.links:
@@ -87,7 +89,7 @@ def test_velocities_and_accelerations_are_derivatives_of_positions(reverse: bool
 
 
 @cache
-def loaded(formulation: str, bearing: mb.JointFriction | None = None) -> Assembled:
+def loaded(formulation: str, bearing: mb.JointFriction | None = None) -> PreparedMechanism:
     """The chain with every kind of force, and friction in all joints that have any."""
     m = chain()
     m.joints = [replace(j, friction=bearing if j.rubs else None) for j in m.joints]
@@ -162,7 +164,7 @@ CONSERVATIVE: dict[str, Force] = {
 
 
 @cache
-def made_in(formulation: str, reverse: bool) -> Assembled:
+def made_in(formulation: str, reverse: bool) -> PreparedMechanism:
     return chain(reverse).prepare(formulation=formulation)
 
 

@@ -122,6 +122,14 @@ def test_schematics_stay_legible_with_other_parameters(figure) -> None:
     check_legible(figure())
 
 
+def test_labels_without_a_free_place_are_omitted(monkeypatch: pytest.MonkeyPatch) -> None:
+    complete = chain(8).schematic()
+    monkeypatch.setattr("symfric.results.schematic.ROOMS", ((20.0, 50.0),))
+    crowded = chain(8).schematic()
+    check_legible(crowded)
+    assert set(texts(crowded)) < set(texts(complete))
+
+
 @pytest.mark.parametrize("name", MECHANISMS)
 def test_arrows_point_along_the_motion(name: str) -> None:
     """A step of each coordinate alone moves the place of its arrow along or about the axis."""

@@ -30,7 +30,7 @@ from symfric.integrator.equations.system import system
 from symfric.integrator.many.chunk import Chunk, Job, Solved, digest
 from symfric.integrator.many.member_data import Store
 from symfric.integrator.many.members import Assembly, program
-from symfric.integrator.methods.attempt import Given, SRow
+from symfric.integrator.methods.attempt import RRow, SRow
 from symfric.integrator.methods.tableaux import RODAS5P
 from symfric.integrator.running.integrator import Integrator
 from symfric.scenes import Pendulum
@@ -268,7 +268,7 @@ def task(
     integrator = Integrator(model, inputs, RODAS5P)
     p, atol = model.values("p"), 1e-7 * integrator.system.nominal
     S = SRow.at(0.0, 1e-8, start)
-    R = Given.of(1.0, 1e-6, 1.0, atol, [*p, *inputs.values[:, 0]])
+    R = RRow.of(1.0, 1e-6, 1.0, atol, [*p, *inputs.values[:, 0]])
     times = np.array([0.0, 0.5, 1.0])
     job = Job(program(integrator), inputs.breaks, times, 10_000)
     return job, Chunk(np.tile(S, (2, 1)), np.tile(R, (2, 1)), inputs.values[None], np.full(2, 1.0))

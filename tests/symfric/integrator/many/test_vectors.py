@@ -16,7 +16,7 @@ from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.many import vectors
 from symfric.integrator.many.members import CompiledMembers, Stretch, many_source
 from symfric.integrator.many.vectors import lanes_header, vector_source
-from symfric.integrator.methods.attempt import Given, SRow
+from symfric.integrator.methods.attempt import RRow, SRow
 from symfric.integrator.methods.tableaux import RODAS5P
 from symfric.integrator.running.integrator import Integrator
 
@@ -176,7 +176,7 @@ def run(
     model, inputs, members = made(make, 3.0, lanes)
     S = SRow.at(0.0, 1e-8, starts)
     d = np.hstack([p, np.tile(inputs.values[:, 0], (starts.shape[0], 1))])
-    R = Given.of(0.0, 1e-6, np.inf, 1e-7 * model.nominal("x"), d)
+    R = RRow.of(0.0, 1e-6, np.inf, 1e-7 * model.nominal("x"), d)
     attempts, h_min = np.zeros(starts.shape[0], dtype=np.int64), np.full(starts.shape[0], 1e-23)
     times = np.array([[0.0, 0.1, 0.35, 1.0, 3.0]])
     found, reason, reach = members.run(

@@ -26,7 +26,7 @@ from symfric.integrator.methods.attempt import (
     GROW,
     REACH,
     SHRINK,
-    Given,
+    RRow,
     SRow,
     Watch,
     build_fixed,
@@ -52,7 +52,7 @@ def column(y: Any, t: float = 0.0, h: float = 0.1, rejected: float = 0.0) -> Arr
 
 
 def data(system: System, t_end: float = 10.0, rtol: float = 1e-6) -> Array:
-    return Given.of(t_end, rtol, np.inf, np.full(system.nx, 0.1 * rtol), [])
+    return RRow.of(t_end, rtol, np.inf, np.full(system.nx, 0.1 * rtol), [])
 
 
 def attempt(
@@ -234,7 +234,7 @@ def test_step_is_too_long_only_for_unstable_modes_even_at_rest(form: str) -> Non
 def test_absolute_tolerance_counts_where_a_state_is_small() -> None:
     step, S = step_of(smooth_ode().model, ca.SX, "rodas5p"), column((1e-9, 1e-9), h=1.0)
     strict, lax = (
-        step(S, Given.of(10.0, 1e-8, np.inf, [a, a], []))[0].full().ravel() for a in (1e-17, 1e-10)
+        step(S, RRow.of(10.0, 1e-8, np.inf, [a, a], []))[0].full().ravel() for a in (1e-17, 1e-10)
     )
     assert (strict[REJECTED], lax[REJECTED]) == (1.0, 0.0)
 

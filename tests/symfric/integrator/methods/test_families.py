@@ -19,7 +19,7 @@ from symfric.integrator.equations.initial import consistent, first_guess
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.methods.attempt import (
     KAPPA,
-    Given,
+    RRow,
     SRow,
     build_dense_step,
     build_fixed,
@@ -167,7 +167,7 @@ def test_failed_iteration_is_rejected_and_the_step_halved(kind: type) -> None:
     """x' = -1000 (x - 1)^3 from 2: a Jacobian at the start says little about the end."""
     model = sf.Model("cubic", x=(x,), ode=-1000 * (x.symbol - 1) ** 3)
     step = build_step(assemble(model), RADAU5, kind)
-    R = Given.of(1.0, 0.05, 1.0, [0.05], [])  # an error of this size would be allowed
+    R = RRow.of(1.0, 0.05, 1.0, [0.05], [])  # an error of this size would be allowed
     after = step(SRow.at(0.0, 0.01, [2.0]), R)[0].full().ravel()
     assert after[SRow.Y].tolist() == [2.0]
     assert after[SRow.H] == pytest.approx(0.005)

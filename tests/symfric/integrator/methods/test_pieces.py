@@ -13,7 +13,7 @@ from symfric.foundation.numeric import Array
 from symfric.integrator.compiled.compiler import load
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.equations.system import system
-from symfric.integrator.methods.attempt import Given, SRow, build_step
+from symfric.integrator.methods.attempt import RRow, SRow, build_step
 from symfric.integrator.methods.pieces import Written, all_macros, in_c, macros, routine
 from symfric.integrator.methods.tableaux import METHODS
 
@@ -34,7 +34,7 @@ def test_an_attempt_has_the_bits_of_the_virtual_machine(kind: object) -> None:
     step = build_step(whole, METHODS["rodas5p"], kind)
     made = library(in_c(step, "made", ("S", "R"), ("next", "D"), head=""))
     S = SRow.at(0.0, 1e-3, np.array([0.01, 0.02]))
-    R = Given.of(1.0, 1e-6, np.inf, np.full(2, 1e-7), np.zeros(whole.d.numel()))
+    R = RRow.of(1.0, 1e-6, np.inf, np.full(2, 1e-7), np.zeros(whole.d.numel()))
     ours, D = np.empty(step.numel_out(0)), np.empty(step.numel_out(1))
     for _ in range(30):
         after, bend = (value.full().ravel() for value in step(S, R))

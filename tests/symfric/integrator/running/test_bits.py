@@ -23,7 +23,7 @@ import symfric.integrator.running.integrator as module
 import symfric.integrator.running.run as running
 from symfric import BrownMcPhee, LuGre, Model, rabinowicz
 from symfric.foundation.numeric import Array
-from symfric.integrator.methods.attempt import Given, SRow, build_step
+from symfric.integrator.methods.attempt import RRow, SRow, build_step
 from symfric.integrator.methods.tableaux import ADAPTIVE, RODAS5P
 from symfric.integrator.running import run
 from symfric.integrator.running.engine import CompiledEngine, Engine, VmEngine, Work, loop_source
@@ -264,7 +264,7 @@ def marched(
     """Advance S up to the end in R; records, attempts made, why it stopped."""
     work = Work(S.size - SRow.MEMORY, R.size, dense, rows)
     work.S[:], work.R[:] = S, R
-    work.over(np.array([S[SRow.T], R[Given.T_END]]), np.zeros((0, 1)))
+    work.over(np.array([S[SRow.T], R[RRow.T_END]]), np.zeros((0, 1)))
     work.loop.h_min = h_min
     records, made, stop = runner.march(work, attempts)
     S[:] = work.S
@@ -276,7 +276,7 @@ def start(y: tuple[float, ...], h: float = 1e-6) -> Array:
 
 
 def data(n: int, t_end: float, rtol: float = 1e-8) -> Array:
-    return Given.of(t_end, rtol, np.inf, np.full(n, 0.1 * rtol), [])
+    return RRow.of(t_end, rtol, np.inf, np.full(n, 0.1 * rtol), [])
 
 
 BELT = rabinowicz(BrownMcPhee())

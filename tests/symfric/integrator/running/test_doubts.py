@@ -191,9 +191,17 @@ def test_laws_are_not_inserted_for_friction_that_only_brakes(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     asked = list[str]()
-    monkeypatch.setattr(doubts, "by_laws", lambda model: asked.append(model.name))
+    monkeypatch.setattr(doubts, "by_laws", lambda model, _: asked.append(model.name))
     sf.simulate(ALL_SCENES["arm"](sf.LuGre()).model(), 1e-3, backend="vm", samples=2)
     assert asked == []
+
+
+def test_a_second_run_derives_no_friction_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    model = Rabinowicz(Pushing()).model()
+    for _ in range(2):
+        with pytest.warns(sf.EnergyWarning):
+            sf.simulate(model, 2.0, samples=2)
+        monkeypatch.setattr(doubts, "_determined", None)
 
 
 def test_bristles_that_return_stored_energy_are_not_reported() -> None:
