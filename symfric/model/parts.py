@@ -9,7 +9,7 @@ from typing import Any, final
 import casadi as ca
 
 from symfric.foundation import checks, units
-from symfric.foundation.numeric import Scalar, is_casadi
+from symfric.foundation.numeric import Array, Scalar, is_casadi
 from symfric.foundation.packed import state_of
 from symfric.foundation.shown import figure_of
 from symfric.foundation.symbolic import take_symbols
@@ -236,8 +236,10 @@ class Part:
         corners: indices of the frames; a body whose frames all coincide with its centre is drawn as
             a block.
         ends: indices of places that have only springs and dampers.
-        fixed: True for the ground, which has no lines.
+        fixed: True for the ground, which has no lines but outlines.
         label: symbol or value of the mass or inertia.
+        outlines: lines [m] that are drawn instead, in the axes of a place given by its index, see
+            `symfric.multibody.outlines`.
     """
 
     name: str
@@ -246,6 +248,7 @@ class Part:
     ends: tuple[int, ...] = ()
     fixed: bool = False
     label: str = ""
+    outlines: tuple[tuple[int, Array], ...] = ()
 
 
 @final
