@@ -9,7 +9,7 @@ from symfric.foundation.numeric import Scalar, equals, is_number
 from symfric.foundation.variable import stacked, strays
 from symfric.model import Output
 from symfric.model.kinds import WORK
-from symfric.model.parts import Arrow, Mark, Part, Sketch, Symbol
+from symfric.model.sketch import Arrow, Mark, Part, Sketch, Symbol
 from symfric.multibody.contact import LeverContact
 from symfric.multibody.equations import Equations
 from symfric.multibody.forces import JointSpringDamper, SpringDamper

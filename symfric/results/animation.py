@@ -18,7 +18,7 @@ from symfric.foundation.panels import blank, grid
 from symfric.foundation.style import EDGE, colour
 from symfric.foundation.units import readable
 from symfric.foundation.variable import stacked
-from symfric.model.parts import Sketch
+from symfric.model.sketch import Sketch
 from symfric.results.films import pictures, write_gif, write_page
 from symfric.results.kinds import friction_laws
 from symfric.results.signals import Signals

@@ -16,7 +16,7 @@ from symfric.foundation.panels import MILLIMETRE, blank, save
 from symfric.foundation.style import COLOURS, EDGE
 from symfric.foundation.variable import starts_of, symbols_of
 from symfric.model import Contact, Model
-from symfric.model.parts import Arrow, Mark, Sketch
+from symfric.model.sketch import Arrow, Mark, Sketch
 from symfric.results.animation import style
 from symfric.results.strokes import Poses, View, look, outlines, strokes
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation.numeric import Array
-from symfric.model.parts import Mark, Part, Sketch
+from symfric.model.sketch import Mark, Part, Sketch
 
 Flags = NDArray[np.bool_]
 FLAT = 1e-6

@@ -16,7 +16,7 @@ from PIL import Image
 
 from symfric import BrownMcPhee, ExactCoulomb, Model, Trajectory, Variable, rabinowicz, simulate
 from symfric.foundation.numeric import Array
-from symfric.model.parts import Mark, Part, Sketch, Symbol
+from symfric.model.sketch import Mark, Part, Sketch, Symbol
 from symfric.multibody import Distance, Mechanism, PinInSlot, Prismatic, Revolute
 from symfric.multibody.results import SPRING
 from symfric.results.animation import SLIDES, STICKS, frame_times, picture
