@@ -301,8 +301,8 @@ def _add_bodies(
             m.body(names.links[link], weight.mass, six.tolist(), weight.com.tolist(), ideal)
     for link, at in places.items():
         name = names.links[link] if names.links[link] != GROUND else _identifier(link)
-        place, axes = f"{names.links[at.body]}.{name}", at.R.T[[2, 0]].tolist()
-        m.frame(place, at.p.tolist(), *axes, outlines[link] if len(outlines[link]) else None)
+        (z, x), outline = at.R.T[[2, 0]].tolist(), outlines[link] if len(outlines[link]) else None
+        m.frame(f"{names.links[at.body]}.{name}", at.p.tolist(), z, x, outline)
 
 
 def _hang(
