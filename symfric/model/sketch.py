@@ -5,6 +5,8 @@ from typing import final
 
 import casadi as ca
 
+from symfric.foundation.numeric import Array
+
 
 @final
 @dataclass(frozen=True, eq=False)
@@ -17,8 +19,10 @@ class Part:
         corners: indices of the frames; a body whose frames all coincide with its centre is drawn as
             a block.
         ends: indices of places that have only springs and dampers.
-        fixed: True for the ground, which has no lines.
+        fixed: True for the ground, which has no lines but outlines.
         label: symbol or value of the mass or inertia.
+        outlines: lines [m] that are drawn instead, in the axes of a place given by its index, see
+            `symfric.multibody.outlines`.
     """
 
     name: str
@@ -27,6 +31,7 @@ class Part:
     ends: tuple[int, ...] = ()
     fixed: bool = False
     label: str = ""
+    outlines: tuple[tuple[int, Array], ...] = ()
 
 
 @final

@@ -165,7 +165,9 @@ def sketch(eq: Equations, scales: Mapping[str, float]) -> Sketch:
         corners = tuple(k for place, k in own if place in ends or place not in pulled)
         far = tuple(k for place, k in own if place not in ends and place in pulled)
         mass = _amount(bodies[name].mass, "kg")
-        parts.append(Part(name, len(columns), corners, far, name == GROUND, mass))
+        drawn = ((k, kin.frame(place).outline) for place, k in own)
+        outlines = tuple((k, lines) for k, lines in drawn if lines is not None)
+        parts.append(Part(name, len(columns), corners, far, name == GROUND, mass, outlines))
         columns.append(_column(motion, ca.SX.eye(3), bodies[name].c))
     marks: list[Mark] = []
     for joint in joints:

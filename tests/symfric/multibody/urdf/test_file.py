@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from robots import SMALL
 
-from symfric.multibody.urdf_file import parse, rotation
+from symfric.multibody.urdf_file import parse
+from symfric.multibody.urdf_text import rotation
 
 LINK = (
     '<link name="tip"><inertial><mass value="1"/>'
@@ -25,13 +26,12 @@ def small(*more: str) -> str:
 
 
 def test_numbers_of_links_and_joints_are_read() -> None:
-    limit = '<limit lower="-1" upper="2.5" effort="7"/><mimic joint="hinge" multiplier="-2"/>'
-    urdf = parse(small(joint(f'<origin xyz="1 2 3"/>{limit}'), LINK))
+    mimic = '<origin xyz="1 2 3"/><mimic joint="hinge" multiplier="-2"/>'
+    urdf = parse(small(joint(mimic), LINK))
     hinge, wrist = urdf.joints
     assert (hinge.kind, hinge.damping, hinge.friction) == ("revolute", 0.3, 0.2)
     assert (hinge.axis.tolist(), hinge.p.tolist()) == ([0, 1, 0], [0, 0, 1])
     assert (wrist.p.tolist(), wrist.axis.tolist()) == ([1, 2, 3], [1, 0, 0])
-    assert wrist.limits == {"lower": -1.0, "upper": 2.5, "effort": 7.0}
     assert wrist.mimic is not None
     assert (wrist.mimic.joint, wrist.mimic.multiplier, wrist.mimic.offset) == ("hinge", -2.0, 0.0)
     arm = urdf.links["arm"]
@@ -42,6 +42,29 @@ def test_numbers_of_links_and_joints_are_read() -> None:
         [0.1, 0.1, 0.01],
     )
     assert (urdf.root, urdf.links["world"]) == ("world", None)
+
+
+@pytest.mark.parametrize(
+    ("kind", "limit", "limits", "left"),
+    [
+        ("prismatic", 'lower="-1" upper="2.5" effort="7"', (-1.0, 2.5, 7.0, None), ""),
+        ("revolute", 'upper="2"', (0.0, 2.0, None, None), ""),
+        ("revolute", 'lower="1" upper="-1" velocity="3"', (None, None, None, 3.0), "lower, upper"),
+        ("continuous", 'upper="9" velocity="3"', (None, None, None, 3.0), "lower, upper"),
+        ("revolute", 'lower="0" upper="0" effort="0" velocity="-1.0"', (None,) * 4,
+         'effort="0"> of joint \'wrist\' <limit velocity="-1.0"'),
+        ("planar", 'effort="9" velocity="2"', (None,) * 4,
+         "effort> of joint 'wrist' <limit velocity"),
+        ("fixed", 'lower="-1" upper="2.5" effort="7"', (None,) * 4, ""),
+    ],
+)  # fmt: skip
+def test_limits_apply_where_they_mean_something(
+    kind: str, limit: str, limits: tuple[float | None, ...], left: str
+) -> None:
+    urdf = parse(small(joint(f"<limit {limit}/>", kind=kind), LINK))
+    given = zip(("lower", "upper", "effort", "velocity"), limits, strict=True)
+    assert urdf.joints[1].limits == {key: x for key, x in given if x is not None}
+    assert " ".join(urdf.left_out) == (f"<limit {left}> of joint 'wrist'" if left else "")
 
 
 @pytest.mark.parametrize(
