@@ -189,14 +189,15 @@ def _values(s: Subject) -> Results:
     named = {item.name: w[i] for i, item in enumerate(s.law.inputs)}
     one = {name: float(value[1]) for name, value in named.items()}
     number = float(s.law.force(s.scale, 1.0, z[:, 1], **one))
-    array = np.ravel(np.asarray(s.law.force(v, 1.0, z, **named), float))
+    array = np.broadcast_to(np.asarray(s.law.force(v, 1.0, z, **named), float), v.shape)
     x, state = ca.MX.sym("v"), ca.MX.sym("z", z.shape[0])
     matrix = ca.Function("law", [x, state], [s.law.force(x, 1.0, state, **one)])
     forces = [number, array[1], s.at(v, 1.0)[0][1], float(matrix(s.scale, z[:, 1]))]
     if not np.allclose(forces, number, rtol=CLOSE, equal_nan=True):
         yield "differ", {"forces": ", ".join(f"{F:g}" for F in forces)}
-    elif not np.isfinite(number):
-        yield "infinite", {"v": s.scale, "F": number}
+    elif not np.isfinite(array).all():
+        k = int(np.isfinite(array).argmin())
+        yield "infinite", {"v": v[k], "F": array[k]}
     else:
         yield "equal", {}
 
@@ -204,7 +205,7 @@ def _values(s: Subject) -> Results:
 def _sign(s: Subject) -> Results:
     for N, v in product(LOADS, (s.speeds, -s.speeds)):
         F = s.at(v, N)[0]
-        if (bad := ~(F * v >= 0)).any():
+        if (bad := F * v < 0).any():
             yield "drives", {"F": F[bad][0], "v": v[bad][0], "N": N}
             return
     yield "opposes", {"low": s.speeds[0], "high": s.speeds[-1]}

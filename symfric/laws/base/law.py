@@ -1,23 +1,20 @@
 """Base class of friction laws: parameters, a force, and the rate of internal states."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import wraps
 from inspect import cleandoc
 from math import inf, isfinite
 from re import DOTALL, search
 from typing import TYPE_CHECKING, Any, ClassVar
 
-import casadi as ca
 import numpy as np
 
 from symfric.foundation import checks
-from symfric.foundation.numeric import Scalar, empty, equals, is_casadi, is_number, is_symbolic
+from symfric.foundation.numeric import Scalar, empty, equals, is_symbolic
 from symfric.foundation.parameters import Parametric, parameters, parametric
-from symfric.foundation.symbolic import plain
-from symfric.foundation.vector import VectorRows
 from symfric.laws.base import smooth
+from symfric.laws.base.methods import check_class, with_states
 from symfric.laws.base.phenomena import CONFIDENCE
 
 if TYPE_CHECKING:
@@ -121,51 +118,6 @@ class Switch:
     rtol: float = inf
 
 
-def with_states(method: Callable[..., Any]) -> Callable[..., Any]:
-    """Wrap `method(law, v, N, z)` so that it accepts states in any common form, with checks."""
-
-    @wraps(method)
-    def checked(law: "Law", v: Scalar, N: Scalar, z: Scalar = (), *more: Any, **inputs: Any) -> Any:
-        slip, load = plain(v), plain(N)
-        for name, value in (("v", slip), ("N", load)):
-            if type(value) is int and not is_number(value):
-                where = f"{type(law).__name__}.{method.__name__}: {name}"
-                raise checks.refused(where, "a number that a float can hold", value)
-        states = states_of(law, slip, plain(z))
-        if type(law).__module__.startswith("symfric."):
-            return method(law, slip, load, states, *more, **inputs)
-        where = f"{type(law).__name__}.{method.__name__}"
-        try:
-            value = method(law, slip, load, states, *more, **inputs)
-        except (TypeError, ValueError, RuntimeError) as error:
-            if not isinstance(slip, np.ndarray) and "truth value" not in str(error):
-                raise
-            raise _unsuitable(where, slip, error) from error
-        if value is None or isinstance(value, list | tuple):
-            raise _unsuitable(where, slip, value)
-        if not is_casadi(value) or is_casadi(slip, load, states, *inputs.values()):
-            return value
-        shape = np.shape(slip) if method.__name__ == "force" else np.shape(states)
-        if not isinstance(value, ca.DM) or value.numel() != np.prod(shape, dtype=int):
-            raise _unsuitable(where, slip, value)
-        return value.full().reshape(shape)[()]
-
-    return checked
-
-
-def _unsuitable(where: str, v: Scalar, got: object) -> ValueError:
-    """Return the error for a method of a user's law that fails, or returns an unsuitable value."""
-    if "truth value" in str(got):
-        return ValueError(
-            f"{where}: expected an expression, got a condition that Python evaluates (if, and, or, "
-            "max, min); write smooth.choose(v > 0, a, b) of symfric.laws"
-        )
-    what, hint = "a force, or a column of rates", "write ca.vertcat(...) for several rates"
-    if isinstance(v, np.ndarray) and not isinstance(got, list | tuple):
-        what, hint = "an array for velocities in an array", "write it with symfric.laws.smooth"
-    return checks.refused(where, what, got, hint)
-
-
 @parametric
 class Law(Parametric, ABC):
     """Friction law F(v, N, z) with internal states dz/dt = rate(v, N, z).
@@ -186,6 +138,7 @@ class Law(Parametric, ABC):
 
     def __init_subclass__(cls, **keywords: Any) -> None:
         super().__init_subclass__(**keywords)
+        check_class(cls)
         for name in ("force", "rate"):
             if name in vars(cls):
                 setattr(cls, name, with_states(vars(cls)[name]))
@@ -366,35 +319,3 @@ class StaticLaw(Law):
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
         """Return an empty column."""
         return empty(v)
-
-
-def states_of(law: Law, v: Scalar, z: Scalar) -> Scalar:
-    """Return `z` with one row for each state of `law`.
-
-    If the law has one state, `z` may be a number, or an array of the shape of the velocities.
-    """
-    given = z
-    if is_casadi(z):
-        rows = z.shape[0] if z.numel() else 0  # a slice of a scalar has shape (1, 0)
-    elif isinstance(z, VectorRows):
-        return z
-    elif is_number(z):
-        z, rows = np.array([z], float), 1
-    elif isinstance(z, tuple | list):
-        rows = len(z)  # pyright: ignore[reportUnknownArgumentType]
-    elif isinstance(z, np.ndarray):
-        if z.ndim == 1 and z.size != 1 and np.shape(v) == z.shape and len(law.states) == 1:
-            z = z[None]
-        rows = z.shape[0]
-    else:
-        rows = -1
-    known = law.states
-    if rows == len(known):
-        return z
-    hint, what = "leave z out", "no states"
-    if known:
-        names = checks.listed(s.name for s in known)
-        what = f"z with {len(known)} {'state' if len(known) == 1 else 'states'}, {names}"
-        hint = "z = law.steady_state(v, N) gives those of steady sliding"
-    got = "none" if rows == 0 else checks.shown(given)
-    raise ValueError(f"{type(law).__name__}: expected {what}, got {got}; {hint}")
