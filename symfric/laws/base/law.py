@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from symfric.foundation import checks
+from symfric.foundation import checks, units
 from symfric.foundation.numeric import Scalar, empty, equals, is_symbolic
 from symfric.foundation.parameters import Parametric, parameters, parametric
 from symfric.laws.base import smooth
-from symfric.laws.base.methods import check_class, with_states
+from symfric.laws.base.methods import check_class, of_user, with_states
 from symfric.laws.base.phenomena import CONFIDENCE
 
 if TYPE_CHECKING:
@@ -73,6 +73,9 @@ class State:
     whole: bool = False
 
     def __post_init__(self) -> None:
+        checks.identifier("state: name", self.name)
+        if units.in_si(self.unit) not in (None, 1.0):
+            raise checks.refused(f"state '{self.name}': unit", "an SI unit", self.unit)
         hint = "parameters are symbols in fits and generated code, so give a number for all values"
         checks.number(f"state '{self.name}': nominal", self.nominal, above=0.0, hint=hint)
 
@@ -142,6 +145,8 @@ class Law(Parametric, ABC):
         for name in ("force", "rate"):
             if name in vars(cls):
                 setattr(cls, name, with_states(vars(cls)[name]))
+        if "outside" in vars(cls) and not cls.__module__.startswith("symfric."):
+            cls.outside = of_user(vars(cls)["outside"])
 
     @property
     @abstractmethod
@@ -288,6 +293,8 @@ def chosen(law: Law, inputs: Mapping[str, Scalar]) -> dict[str, Scalar]:
 def require_law(where: str, law: object) -> None:
     """Raise an error if `law` is not a law; the hint covers the class and the name of a law."""
     if isinstance(law, Law):
+        if not type(law).__module__.startswith("symfric."):
+            _check_states(type(law).__name__, law.states)
         return
     hint = ""
     if isinstance(law, type) and issubclass(law, Law):
@@ -295,6 +302,16 @@ def require_law(where: str, law: object) -> None:
     elif isinstance(law, str):
         hint = f"use law_from_text({law!r})"
     raise checks.refused(where, "a law such as LuGre()", law, hint)
+
+
+def _check_states(name: str, states: object) -> None:
+    """Raise an error if the states of a user's law are not a tuple of states with own names."""
+    if not isinstance(states, tuple | list) or not all(isinstance(s, State) for s in states):
+        hint = "a method that returns them needs @property"
+        raise checks.refused(f"{name}: states", "a tuple of State(...)", states, hint)
+    names = [state.name for state in states]
+    if len(set(names)) < len(names):
+        raise checks.refused(f"{name}: states", "every name once", ", ".join(names))
 
 
 @parametric
