@@ -173,7 +173,12 @@ def _equilibria(
 
 
 def _traced(
-    curve: Family, node: Node, ways: list[Array], span: tuple[float, float], points: int, step: float
+    curve: Family,
+    node: Node,
+    ways: list[Array],
+    span: tuple[float, float],
+    points: int,
+    step: float,
 ) -> list[Trace]:
     """Return the parts of the curve from `node` in each direction, extended in turn."""
     first, reason = curve.point(node), f"ends after {points} points"
