@@ -14,6 +14,7 @@ depend on its size and number only, so the result does not depend on the number 
 
 import argparse
 from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
+from importlib import import_module
 from multiprocessing import get_context
 from pathlib import Path
 from time import perf_counter
@@ -28,7 +29,7 @@ SPEEDS = np.linspace(0.02, 0.2, 19)  # m/s, edges of the bins
 PEAKS = np.linspace(0.0, 3.0, 301)  # m
 
 
-def block(number: int, members: int) -> dict[str, np.ndarray]:
+def block(number: int, members: int) -> dict[str, Any]:
     """Simulate the machines of one block and return counts and extremes over the speed."""
     draw = np.random.default_rng([members, number])
     mu_d, rise = draw.uniform(0.05, 0.15, members), draw.uniform(0.0, 0.1, members)
@@ -61,7 +62,7 @@ def run(out: Path, numbers: range, members: int, executor: Executor) -> None:
 def show(out: Path) -> None:
     """Print and plot the quantiles of the peak over the speed, from all stored blocks."""
     parts: list[Any] = [np.load(path) for path in sorted(out.glob("*.npz"))]
-    counts = sum(part["counts"] for part in parts)
+    counts = np.sum([part["counts"] for part in parts], axis=0)
     share = np.cumsum(counts, axis=1) / counts.sum(axis=1, keepdims=True)
     middle = (SPEEDS[1:] + SPEEDS[:-1]) / 2
     figure, axes = plt.subplots(layout="constrained")
@@ -86,9 +87,8 @@ def main() -> None:
     given = parser.parse_args()
     first, last = map(int, given.blocks.split(":"))
     if given.scheduler:
-        from distributed import Client  # noqa: PLC0415  (extra: pip install symfric[cluster])
-
-        executor = Client(given.scheduler).get_executor()
+        distributed: Any = import_module("distributed")  # extra: pip install symfric[cluster]
+        executor = distributed.Client(given.scheduler).get_executor()
     else:
         executor = ProcessPoolExecutor(mp_context=get_context("spawn"))
     with executor:
