@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -69,7 +69,11 @@ def portrait(run: Trajectory, x: str, y: str, path: str | Path | None) -> Figure
     return save(figure, path)
 
 
-STYLES = {1: ("-", ""), -1: ("--", "unstable"), 0: (":", "on the limit of stability")}
+STYLES: dict[int, tuple[Literal["-", "--", ":"], str]] = {
+    1: ("-", ""),
+    -1: ("--", "unstable"),
+    0: (":", "on the limit of stability"),
+}
 """Line styles by stability, and their legend entries."""
 
 
