@@ -1,8 +1,9 @@
 """Base class of friction laws: parameters, a force, and the rate of internal states."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import wraps
 from inspect import cleandoc
 from math import inf, isfinite
 from re import DOTALL, search
@@ -11,11 +12,13 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from symfric.foundation import checks, units
-from symfric.foundation.numeric import Scalar, empty, equals, is_symbolic
+from symfric.foundation.numeric import Scalar, empty, equals, is_casadi, is_number, is_symbolic
 from symfric.foundation.parameters import Parametric, parameters, parametric
+from symfric.foundation.symbolic import plain
+from symfric.foundation.vector import VectorRows
 from symfric.laws.base import smooth
-from symfric.laws.base.methods import check_class, of_user, with_states
-from symfric.laws.base.phenomena import CONFIDENCE
+from symfric.laws.base.parts import CONFIDENCE, called, check_class, of_user
+from symfric.laws.base.parts import Switch as Switch
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -99,26 +102,23 @@ APPLIED_FORCE = Input(FORCE, "N", "force that keeps the sliding velocity constan
 """Force that the contact must carry for zero acceleration: m dv/dt = F_e - F."""
 
 
-@dataclass(frozen=True, eq=False)
-class Switch:
-    """Change of mode: the states in `reset` jump when `expression` passes through zero.
+def with_states(method: Callable[..., Any]) -> Callable[..., Any]:
+    """Wrap `method(law, v, N, z)` so that it accepts states in any common form, with checks."""
 
-    Attributes:
-        expression: function of v, N, z and the further inputs of the law.
-        direction: 1 for rising zeros only, -1 for falling zeros only, 0 for both.
-        reset: maps a state to its value after the change, in terms of the values before it.
-        halts: True if the sliding velocity is set to exactly zero at the change.
-        at_start: True if it also occurs at the start when the expression is already beyond zero.
-        rtol: largest relative tolerance of a run, for laws that require accurate instants.
-    """
+    @wraps(method)
+    def checked(law: Any, v: Scalar, N: Scalar, z: Scalar = (), *more: Any, **inputs: Any) -> Any:
+        slip, load = plain(v), plain(N)
+        for name, value in (("v", slip), ("N", load)):
+            if type(value) is int and not is_number(value):
+                where = f"{type(law).__name__}.{method.__name__}: {name}"
+                raise checks.refused(where, "a number that a float can hold", value)
+        states = states_of(law, slip, plain(z))
+        if type(law).__module__.startswith("symfric."):
+            return method(law, slip, load, states, *more, **inputs)
+        like = slip if method.__name__ == "force" else states
+        return called(method, law, (slip, load, states, *more), inputs, like)
 
-    name: str
-    expression: Scalar
-    direction: int = 0
-    reset: Mapping[str, Scalar] = field(default_factory=dict[str, Scalar])
-    halts: bool = False
-    at_start: bool = False
-    rtol: float = inf
+    return checked
 
 
 @parametric
@@ -141,12 +141,13 @@ class Law(Parametric, ABC):
 
     def __init_subclass__(cls, **keywords: Any) -> None:
         super().__init_subclass__(**keywords)
-        check_class(cls)
+        if not cls.__module__.startswith("symfric."):
+            check_class(cls)
+            if "outside" in vars(cls):
+                cls.outside = of_user(cls.outside)
         for name in ("force", "rate"):
             if name in vars(cls):
                 setattr(cls, name, with_states(vars(cls)[name]))
-        if "outside" in vars(cls) and not cls.__module__.startswith("symfric."):
-            cls.outside = of_user(vars(cls)["outside"])
 
     @property
     @abstractmethod
@@ -336,3 +337,35 @@ class StaticLaw(Law):
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
         """Return an empty column."""
         return empty(v)
+
+
+def states_of(law: Any, v: Scalar, z: Scalar) -> Scalar:
+    """Return `z` with one row for each state of `law`.
+
+    If the law has one state, `z` may be a number, or an array of the shape of the velocities.
+    """
+    given = z
+    if is_casadi(z):
+        rows = z.shape[0] if z.numel() else 0  # a slice of a scalar has shape (1, 0)
+    elif isinstance(z, VectorRows):
+        return z
+    elif is_number(z):
+        z, rows = np.array([z], float), 1
+    elif isinstance(z, tuple | list):
+        rows = len(z)  # pyright: ignore[reportUnknownArgumentType]
+    elif isinstance(z, np.ndarray):
+        if z.ndim == 1 and z.size != 1 and np.shape(v) == z.shape and len(law.states) == 1:
+            z = z[None]
+        rows = z.shape[0]
+    else:
+        rows = -1
+    known = law.states
+    if rows == len(known):
+        return z
+    hint, what = "leave z out", "no states"
+    if known:
+        names = checks.listed(s.name for s in known)
+        what = f"z with {len(known)} {'state' if len(known) == 1 else 'states'}, {names}"
+        hint = "z = law.steady_state(v, N) gives those of steady sliding"
+    got = "none" if rows == 0 else checks.shown(given)
+    raise ValueError(f"{type(law).__name__}: expected {what}, got {got}; {hint}")
