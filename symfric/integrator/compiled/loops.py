@@ -203,7 +203,7 @@ def _periods(form: Integers) -> list[int]:
     return [p for p, _ in Counter(np.diff(order)[equal].tolist()).most_common(PERIODS)]
 
 
-class Layout(NamedTuple):
+class Storage(NamedTuple):
     """Places of all values.
 
     Attributes:
@@ -218,7 +218,7 @@ class Layout(NamedTuple):
     size: int
 
 
-def layout(code: Code, parts: Sequence[Section]) -> Layout:
+def storage_of(code: Code, parts: Sequence[Section]) -> Storage:
     """Return the places of all values if these `parts` of a function become C functions.
 
     A register holds an operand if the same iteration of the same part computes it, in all
@@ -244,14 +244,14 @@ def layout(code: Code, parts: Sequence[Section]) -> Layout:
         size += count * s.times
     read[value & ~kept] = slot[read[value & ~kept]]
     stores = np.array([not register for register in code.register])
-    return Layout(kept, np.column_stack([read, np.where(stores, code.row, slot)]), size)
+    return Storage(kept, np.column_stack([read, np.where(stores, code.row, slot)]), size)
 
 
 def written(name: str, code: Code, parts: Sequence[Section]) -> str:
     """Return the C of the function `name`, divided into `parts`."""
-    placed, names = layout(code, parts), sorted(code.sizes)
+    storage, names = storage_of(code, parts), sorted(code.sizes)
     typed = "".join(f"{'const ' * (x[0] == 'x')}casadi_real *restrict {x}, " for x in names)
-    functions, lines, end, used = list[str](), list[str](), placed.size, 1
+    functions, lines, end, used = list[str](), list[str](), storage.size, 1
     for x in names:
         if x[0] == "x":
             lines.append(f"const casadi_real *{x} = arg[{x[1:]}] ? arg[{x[1:]}] : zeros;")
@@ -261,7 +261,7 @@ def written(name: str, code: Code, parts: Sequence[Section]) -> str:
             end += code.sizes[x]
     for k, part in enumerate(parts):
         head = f"static {APART} void {name}_{k}({typed}casadi_real *restrict v)"
-        functions.append(f"{head} {{\n{_body(code, placed, part)}}}\n\n")
+        functions.append(f"{head} {{\n{_body(code, storage, part)}}}\n\n")
         lines.append(f"{name}_{k}({', '.join([*names, 'v'])});")
     lines = [f"static casadi_real zeros[{used}];", f"casadi_real v[{end + 1}];", *lines]
     body = "".join(f"  {line}\n" for line in (*lines, "return 0;"))
@@ -269,9 +269,9 @@ def written(name: str, code: Code, parts: Sequence[Section]) -> str:
     return f"{''.join(functions)}static int {name}({head}) {{\n{body}}}\n"
 
 
-def _body(code: Code, placed: Layout, s: Section) -> str:
+def _body(code: Code, storage: Storage, s: Section) -> str:
     """Return the body of the C function of a part."""
-    places = s.folded(placed.places)
+    places = s.folded(storage.places)
     step = places[min(1, s.times - 1)] - places[0]
     affine = (places == places[0] + step * np.arange(s.times)[:, None, None]).all(axis=0)
     rows, numbers = list[list[int]](), list[list[str]]()
@@ -285,7 +285,7 @@ def _body(code: Code, placed: Layout, s: Section) -> str:
 
     def operand(k: int, i: int) -> str:
         kind, group, place = code.operands[s.begin + k, i].tolist()
-        if placed.kept[s.begin + k, i]:
+        if storage.kept[s.begin + k, i]:
             return f"a{code.register[place]}"
         if kind != NUMBER:
             return f"{'v' if kind == VALUE else f'x{group}'}[{row(k, i)}]"
