@@ -20,7 +20,7 @@ from symfric.foundation.checks import expression
 from symfric.foundation.numeric import Scalar
 from symfric.multibody.contact import Contact
 from symfric.multibody.dynamics import numbered, twist_jacobian
-from symfric.multibody.forces import Axial, Load, OnJoint, Part
+from symfric.multibody.forces import Axial, Load, OnJoint, Part, evaluated
 from symfric.multibody.joint import Joint
 from symfric.multibody.kinematics import Kinematics, Motion
 from symfric.multibody.spatial import GROUND
@@ -148,7 +148,7 @@ class UserConstraint(Constraint):
     """Constraint that sets expressions of positions and time to zero.
 
     `expression` takes the kinematics, with `point("body.frame")` for a position (and a velocity,
-    which must not be used), `motion["body"]` with R and p, `along(joint, direction)` for a
+    which must not be used), `motion["body"]` with R and p, `along("joint", direction)` for a
     displacement, and the time `t`. It returns one expression or a column of expressions. The
     multipliers are `<name>_lambda`, or `<name>_lambda_1`, `<name>_lambda_2`, ... The bodies are
     loaded with -phi_p' lam at their origins, so that joint reactions and friction are correct.
@@ -165,7 +165,7 @@ class UserConstraint(Constraint):
         for name in (n for n in kin.motion if n != GROUND):
             motion[name] = Motion(ca.SX.sym("R", 3, 3), *(ca.SX.sym(x, 3) for x in "pwvab"))
         probe = replace(kin, motion=motion)
-        given: Any = self.expression(probe)
+        given: Any = evaluated(self, probe)
         try:
             phi = ca.SX(ca.vertcat(*given) if isinstance(given, tuple | list) else given)
         except (NotImplementedError, RuntimeError):

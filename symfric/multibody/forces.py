@@ -116,6 +116,21 @@ class Part(Keywords, ABC):
                 yield f"{item.name}: {expected}, got {value!r}; write lambda {of[1]}: ..."
 
 
+def evaluated(part: Any, kin: Kinematics) -> Any:
+    """Return `part.expression(kin)`.
+
+    Raises:
+        ValueError: the expression uses a name that the mechanism does not have.
+    """
+    where = f"{part.kind} '{part.name}' > expression"
+    try:
+        return part.expression(kin)
+    except KeyError as error:
+        raise checks.refused(where, "names of bodies or joints", error.args[0]) from error
+    except ValueError as error:
+        raise ValueError(f"{where} > {error}") from error
+
+
 class OnJoint(Part):
     """Force or constraint in one direction of a joint."""
 
@@ -330,7 +345,7 @@ class UserForce(Force):
     """Force [N] and moment [N m] at a place as expressions of the motion of any bodies.
 
     `expression` takes the kinematics, with `point("body.frame")` for position and velocity,
-    `motion["body"]` with R, p, w, v, and `along(joint, direction)` for a displacement or an angle
+    `motion["body"]` with R, p, w, v, and `along("joint", direction)` for a displacement or an angle
     that counts full turns, and its rate. It returns force and moment in world components.
     """
 
@@ -346,7 +361,7 @@ class UserForce(Force):
 
     def loads(self, kin: Kinematics) -> Iterator[Load | Axial]:
         """Yield force and moment of the user's expression."""
-        given: Any = self.expression(kin)
+        given: Any = evaluated(self, kin)
         pair: Sequence[Any] = given if isinstance(given, tuple | list) else ()
         if len(pair) != 2 or not all(map(is_vector, pair)):
             what = "a force and a moment, three numbers or expressions each"

@@ -103,9 +103,9 @@ class Mechanism(packed.Portable, Showing):
     def schematic(self, path: str | Path | None = None, p: Variables = ()) -> "Figure":
         """Return a labelled figure of the mechanism at its start, 85 mm wide.
 
-        It has bodies, joints, springs and dampers with their names and parameters, coordinates
-        (blue) and inputs (green) with their positive directions, and contacts with friction with
-        their loads (orange).
+        It has bodies, joints, forces other than gravity, and constraints with their names or
+        parameters, coordinates (blue) and inputs (green) with their positive directions, and
+        contacts with friction with their loads (orange).
 
         Args:
             path: output file; its suffix (.png, .svg, .pdf) selects the format.

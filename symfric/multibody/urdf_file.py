@@ -19,8 +19,12 @@ KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 SINGLE = KINDS[:3]
 """Kinds of joints with one coordinate."""
 LIMITS = ("lower", "upper", "effort", "velocity")
-DYNAMICS = (("damping", "mu_viscous"), ("friction", "mu_coulomb"))
-"""Names in <dynamics> of damping and friction: of the specification, and of Franka's files."""
+DYNAMICS = (("damping", "mu_viscous"), ("friction", "mu_coulomb", "frictionloss"))
+"""Names in <dynamics> of damping and friction: of the specification, of Franka and of MuJoCo."""
+UNLIMITED = 1e9
+"""Magnitude from which limits are none; Gazebo writes 1e16."""
+BLANK = "\ufeff \t\r\n"
+"""Characters around the content of a file; the first one is the mark of its byte order."""
 POINT = 1e-15
 """Inertia per mass [m^2] below which an inertia is zero: a radius of gyration of 30 nm."""
 
@@ -130,11 +134,11 @@ def parse(source: str | Path, strict: bool = False) -> Urdf:
             all problems at once, each with its path ("urdf 'arm' > joint 'elbow' > axis").
         OSError: the file cannot be read.
     """
-    is_text = isinstance(source, str) and source.lstrip().startswith("<")
+    is_text = isinstance(source, str) and source.lstrip(BLANK).startswith("<")
     where = "urdf" if is_text else f"urdf '{checks.path('urdf', source)}'"
     if not is_text and not Path(source).is_file():
         raise ValueError(f"{where}: expected a file, got nothing there; check the path")
-    content = str(source).strip().encode() if is_text else Path(source).read_bytes()
+    content = str(source).strip(BLANK).encode() if is_text else Path(source).read_bytes()
     try:
         robot = tags(content, "utf-8" if is_text else None)
     except expat.ExpatError as error:
@@ -144,7 +148,10 @@ def parse(source: str | Path, strict: bool = False) -> Urdf:
     name = robot.get("name") or ("robot" if is_text else Path(source).stem)
     notes = Notes(strict)
     links = {tag.get("name", ""): _inertial(tag, notes) for tag in robot.findall("link")}
-    outlines = {tag.get("name", ""): outline(tag, notes) for tag in robot.findall("link")}
+    looks = Notes(left_out=notes.left_out)
+    outlines = {tag.get("name", ""): outline(tag, looks) for tag in robot.findall("link")}
+    for text in (*looks.problems, *looks.doubts):
+        notes.doubt(text)
     joints = tuple(_joint(tag, notes) for tag in robot.findall("joint"))
     notes.others("", robot, {"link", "joint"})
     _check_names(robot, notes)
@@ -230,9 +237,10 @@ def _limits(where: str, kind: str, tag: ET.Element | None, notes: Notes) -> dict
     """Return the limits that apply to a joint: ends with lower < upper, and others above zero."""
     given = {} if tag is None or kind == "fixed" else tag.attrib
     found = {key: notes.number(f"{where} > limit", tag, key) for key in LIMITS if key in given}
+    found = {key: value for key, value in found.items() if abs(value) < UNLIMITED}
     if kind not in SINGLE:
-        for key in found:
-            notes.left(f"limit {key}", where)
+        if found:
+            notes.left("limit", where)
         return {}
     low, high = found.pop("lower", 0.0), found.pop("upper", 0.0)
     if kind != "continuous" and low < high:
@@ -253,9 +261,11 @@ def _dynamics(where: str, tag: ET.Element | None, notes: Notes) -> tuple[float, 
     A name of the specification takes precedence, even with the value zero.
     """
     inside = {} if tag is None else {one.tag: (one.text or "").strip() for one in tag} | tag.attrib
+    known = {name for names in DYNAMICS for name in names}
+    inside = {low if (low := key.lower()) in known else key: x for key, x in inside.items()}
     both = ET.Element("dynamics", inside)
     for key in inside:
-        if not any(key in names for names in DYNAMICS):
+        if key not in known:
             notes.left(f"dynamics {key}", where)
     levels: list[float] = []
     for names in DYNAMICS:

@@ -1,7 +1,7 @@
 """Numbers, poses and solids in the tags of a URDF file, and notes about them."""
 
 import xml.etree.ElementTree as ET
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from math import cos, isfinite, sin
 from typing import final
@@ -14,8 +14,19 @@ from symfric.multibody.outlines import box, cylinder, sphere
 
 APPEARANCE = {"visual", "collision", "material"}
 """Tags that are ignored without a note."""
+TURNS = 13.0
+"""Magnitude of angles [rad], about two turns, above which they are probably degrees."""
 SNAP = 1e-15
 """Magnitude below which entries of rotation matrices are set to zero, as after a quarter turn."""
+
+ROUND = ("radius", "0"), ("length", "0")
+SOLIDS: dict[str, tuple[Callable[..., Array], tuple[tuple[str, str], ...]]] = {
+    "box": (box, (("size", "0 0 0"),)),
+    "cylinder": (cylinder, ROUND),
+    "capsule": (cylinder, ROUND),
+    "sphere": (sphere, ROUND[:1]),
+}
+"""Outline of each solid, and its attributes with their zeros; capsules are drawn as cylinders."""
 
 
 @final
@@ -38,6 +49,8 @@ class Notes:
                 self.problems.append("<xacro>: expected plain URDF; expand the file with xacro")
             elif other.tag not in {*known, *APPEARANCE}:
                 self.left(other.tag, where)
+                if (meant := other.tag.lower()) in known:
+                    self.problems.append(f"<{other.tag}>: expected <{meant}>, in lower case")
 
     def doubt(self, text: str) -> None:
         """Note an implausible value that other tools accept."""
@@ -73,8 +86,10 @@ class Notes:
     def pose(self, where: str, tag: ET.Element) -> tuple[Array, Array]:
         """Return the rotation and position in the tag <origin> of `tag`."""
         origin, at = tag.find("origin"), f"{where} > origin"
-        turn = rotation(*self.numbers(at, origin, "rpy", "0 0 0"))
-        return turn, self.numbers(at, origin, "xyz", "0 0 0")
+        rpy = self.numbers(at, origin, "rpy", "0 0 0")
+        if np.abs(rpy).max() > TURNS:
+            self.doubt(f"{at}: expected rpy in radians, got {', '.join(f'{x:g}' for x in rpy)}")
+        return rotation(*rpy), self.numbers(at, origin, "xyz", "0 0 0")
 
 
 def rotation(roll: float, pitch: float, yaw: float) -> Array:
@@ -106,14 +121,10 @@ def outline(tag: ET.Element, notes: Notes) -> Array:
         where = f"{link} > visual"
         R, p = notes.pose(where, visual)
         for solid in visual.iterfind("geometry/*"):
-            if solid.tag == "box":
-                lines = box(*notes.numbers(where, solid, "size", "0 0 0"))
-            elif solid.tag in ("cylinder", "capsule"):
-                lines = cylinder(*(notes.number(where, solid, key) for key in ("radius", "length")))
-            elif solid.tag == "sphere":
-                lines = sphere(notes.number(where, solid, "radius"))
+            draw, keys = SOLIDS.get(solid.tag.rpartition(":")[2], (None, ()))
+            sizes = [x for key, zero in keys for x in notes.numbers(where, solid, key, zero)]
+            if draw is None or min(sizes) <= 0:
+                notes.left(solid.tag, link)
             else:
-                notes.left(f"{solid.tag}", link)
-                continue
-            found.append(lines @ R.T + p)
+                found.append(draw(*sizes) @ R.T + p)
     return np.concatenate(found)
