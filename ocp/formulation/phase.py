@@ -357,9 +357,9 @@ class Span:
         x, z, u, p = ({v.name for v in getattr(self.model, k)} for k in "xzup")
         agree(
             "Span",
-            self.boxes.keys() == x | z | u,
-            all(ranges.keys() == x for ranges in self.nodes.values()),
-            all(ranges.keys() == u for ranges in self.inputs_at.values()),
+            {*self.boxes} == x | z | u,
+            all({*ranges} == x for ranges in self.nodes.values()),
+            all({*ranges} == u for ranges in self.inputs_at.values()),
             p.issuperset(self.chosen),
             self.p.shape == (len(p),),
         )
