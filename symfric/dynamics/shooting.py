@@ -8,7 +8,8 @@ where S = 1, or the signs of a symmetric orbit, whose T is half of its period. T
 independent coordinates of each x_i (constraints of mechanisms and sticking contacts are kept), and
 T unless it is given. Without a given period, the correction of x_0 is orthogonal to its rate. The
 derivatives of phi are those of `simulate`, with saltation matrices at events. `solved` finds an
-orbit by damped Newton steps.
+orbit by damped Newton steps. Cyclic states, on which nothing depends, keep their start values and
+need not return.
 """
 
 from collections.abc import Mapping
@@ -114,8 +115,13 @@ class OrbitShooting:
 
     @cached_property
     def states(self) -> Indices:
-        """Indices of the states that are not modes."""
-        return np.setdiff1d(np.arange(len(self.model.x)), self.eq.modes)
+        """Indices of the states that are neither modes nor cyclic."""
+        return np.setdiff1d(self.returning, self.eq.modes)
+
+    @cached_property
+    def returning(self) -> Indices:
+        """Indices of the states that are equal after a period: all but the cyclic ones."""
+        return np.setdiff1d(np.arange(len(self.model.x)), self.eq.cyclic)
 
     @cached_property
     def rate(self) -> ca.Function:

@@ -18,6 +18,7 @@ from symfric.foundation.parameters import Variable, check_names
 from symfric.foundation.shown import Showing, Shown, TextTable, among, counted, figure_of
 from symfric.foundation.variable import stacked
 from symfric.model.forces import closed, opened, reopened, with_forces
+from symfric.model.kinds import MODE
 from symfric.model.parts import Holonomic, Monitor, Output
 from symfric.model.problems import (
     GROUPS,
@@ -203,6 +204,16 @@ class Model(Showing, System):
         taken = {*found, *self.signals, *(v.name for v in self.p)}
         own = accelerations(self).items()
         return found | {name: output for name, output in own if name not in taken}
+
+    @cached_property
+    def cyclic(self) -> tuple[str, ...]:
+        """Names of the states on which no equation or event depends, such as a counted angle."""
+        constraints = ca.SX(0, 1) if self.holonomic is None else self.holonomic.phi
+        events = [ca.SX(e) for one in self.events for e in (one.expression, *one.reset.values())]
+        rows = ca.vertcat(self.residual, constraints, *events)
+        used = ca.DM(ca.sum1(ca.jacobian_sparsity(rows, self.vector("x")))).full().ravel()
+        pairs = zip(self.x, used, strict=True)
+        return tuple(v.name for v, count in pairs if not count and v.kind != MODE)
 
     def expression(self, name: str) -> ca.SX:
         """Return the signal or detail `name` in the symbols of the model.

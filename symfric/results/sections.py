@@ -171,7 +171,7 @@ class Cycle(Showing):
 def cycle(run: Signals, section: ca.SX | None, tolerance: float) -> Cycle:
     """Return the cycle that a run settles to; see `Trajectory.period`."""
     where, model = f"trajectory of '{run.scene}': period", run.model
-    states = [v for v in model.x if v.kind != MODE]
+    states = [v for v in model.x if v.kind != MODE and v.name not in model.cyclic]
     column = ca.vertcat(*(v.symbol for v in states))
     looks = run.looks
     late = looks[looks >= (looks[0] + looks[-1]) / 2]
@@ -197,8 +197,8 @@ def cycle(run: Signals, section: ca.SX | None, tolerance: float) -> Cycle:
             good = int(np.flatnonzero(off > tolerance).max(initial=-1)) + 1
             start, period = float(times[-1 - n]), float(times[-1] - times[-1 - n])
             return Cycle(run, period, start, float(times[good]), times, float(off[-1]))
-    off = np.abs(at[:, 1:] - at[:, :-1]).max(axis=0)
+    off = np.abs(at[:, 1:] - at[:, :-1]).max(axis=0)[-RETURNS:].max()
     raise ValueError(
         f"{where}: expected a motion that repeats to {tolerance:g} of its range, got one that "
-        f"differs by {off[-1]:.2g} between crossings; simulate longer, or raise the tolerance"
+        f"differs by {off:.2g} between crossings; simulate longer, or raise the tolerance"
     )
