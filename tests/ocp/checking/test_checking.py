@@ -19,14 +19,7 @@ from ocp.checking.verify import left_between, verified, verified_arcs, verify
 from ocp.formulation.expressions import TIME, integral
 from ocp.formulation.phase import FREE, Free, Phase
 from ocp.formulation.problem import Problem
-from ocp.problems import (
-    READY,
-    alp_rider,
-    brachistochrone,
-    bryson_denham,
-    goddard,
-    hang_glider,
-)  # fmt: skip
+from ocp.problems import READY, alp_rider, brachistochrone, bryson_denham, goddard, hang_glider
 from ocp.solving.methods import Ipopt
 from ocp.solving.one_solve import Task
 from ocp.solving.prepared import Supervisor
@@ -81,9 +74,8 @@ def test_bounds_between_nodes_are_relative_to_the_whole_arc(restarts: list[int])
     phase = Phase(stage, 2.0, start={"v": 1.0})
     problem = Problem(phase, EFFORT, bounds={"room": (0.0, None)})
     arc = replace(there_and_back()[1], span=problem.spans[0])
-    parts = [run_from(arc, node, arc.state(node)) for node in restarts]
-    ends = arc.times[[*restarts[1:], -1]]
-    runs = [run._replace(end=end) for run, end in zip(parts, ends, strict=True)]
+    ends = zip(restarts, arc.times[[*restarts[1:], -1]], strict=True)
+    runs = [run_from(arc, node, arc.state(node))._replace(end=end) for node, end in ends]
     assert left_between(runs, 0.01).tolist() == [False, True, False]
     assert not left_between(runs, 0.1).any()  # a tenth of 0.49 m, not of 0.046 m
 
