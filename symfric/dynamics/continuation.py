@@ -3,6 +3,7 @@
 from collections import deque
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from symfric.foundation.parameters import check_names
 from symfric.integrator.equations.inputs import Input
 from symfric.model import Model
 
+At = TypeVar("At", bound=Equilibrium | PeriodicOrbit)
 INTERRUPTED = "interrupted by the user"
 SMALL = 1e-3
 """First amplitude of orbits from a Hopf point, relative to the magnitudes of the states."""
@@ -45,7 +47,7 @@ def continuation(
     Args:
         start: isolated equilibrium, or a periodic orbit that is not `symmetric`. A given period
             does not change.
-        parameter: name of a free parameter of the model.
+        parameter: name of a free parameter of the model, or of an input that is constant.
         between: smallest and largest value of the parameter, within its bounds.
         points: largest number of points.
         step: longest step, relative to the magnitudes of states, period and range of the parameter.
@@ -60,6 +62,8 @@ def continuation(
     where = "continuation"
     if not isinstance(start, Equilibrium | PeriodicOrbit):  # pyright: ignore[reportUnnecessaryIsInstance]
         raise checks.refused(f"{where}: start", "an equilibrium or a periodic orbit", start)
+    if parameter in start.u:
+        start = _with_parameter(start, parameter)
     model = start.model
     hint = f"free it when the model is made, such as rabinowicz(law, free=['{parameter}'])"
     check_names(f"{where}: parameter", [parameter], [v.name for v in model.p], hint)
@@ -123,6 +127,16 @@ def orbits_from(
     tau = tangent(curve, node, along)
     (part,) = _traced(curve, node, [tau], span, points, step)
     return _joined(model, branch.parameter, branch.u, branch.p, [Trace(), part], driven=False)
+
+
+def _with_parameter(start: At, name: str) -> At:
+    """Return the start with a constant input as the last parameter of its model."""
+    model, u = start.model, dict(start.u)
+    value = checks.number(f"continuation: input {name}", u.pop(name))
+    (given,) = (v for v in model.u if v.name == name)
+    others = tuple(v for v in model.u if v is not given)
+    changed = replace(model, u=others, p=(*model.p, given))
+    return replace(start, model=changed, u=u, p={**start.p, name: value})
 
 
 def checked_span(

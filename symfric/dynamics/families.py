@@ -195,7 +195,8 @@ class Orbits(Family):
         if self.problem.driven or len(points) < 2:
             return None
         one, other = points[-2:]
-        sizes = (((p.high - p.low) / self.scale[: p.x.size]).max() for p in (one, other))
+        own = self.problem.states
+        sizes = (((p.high - p.low)[own] / self.scale[own]).max() for p in (one, other))
         a, b = (float(size) ** 2 for size in sizes)
         if not b < min(a, VANISHES**2):
             return None

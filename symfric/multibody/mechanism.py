@@ -169,7 +169,9 @@ class Mechanism(packed.Portable, Showing):
         what = wanted.__name__
         if not isinstance(part, wanted):
             message = f"expected a {what} of symfric.multibody, got {shown(part)}"
-            self._wrong.append(f"{what.lower()}: {message}")
+            kinds = [k.__name__.lower() for k in (Joint, Force, Constraint) if isinstance(part, k)]
+            hint = "".join(f"; add it by {kind}(...)" for kind in kinds)
+            self._wrong.append(f"{what.lower()}: {message}{hint}")
         elif odd := list(checks.texts(part)):
             self._wrong += [f"{what.lower()} {shown(getattr(part, 'name', ''))} > {t}" for t in odd]
         else:

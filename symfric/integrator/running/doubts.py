@@ -57,7 +57,7 @@ SHARE = 1e-3
 REMEMBERED = 16
 """Number of parameter sets whose first check is cached."""
 CLEAR = 1e-3
-"""Fraction of the larger bound beyond which a bound is exceeded."""
+"""Fraction of the larger bound, or of the nominal value for 0, beyond which it is exceeded."""
 MARGIN = 0.05
 """Fraction by which integration errors may raise friction above its level."""
 WIDE = 0.25
@@ -96,7 +96,7 @@ def _exceeded(integrator: Integrator, inputs: InputData, run: RunRecord, p: Arra
     values = _over_time(integrator, inputs, "bounded", symbols_of(limited), t, y, p)
     for v, x in zip(limited, values, strict=True):
         beyond = np.maximum(v.lower - x, x - v.upper)
-        size = max(abs(b) for b in (v.lower, v.upper) if isfinite(b))
+        size = max(abs(b) for b in (v.lower, v.upper) if isfinite(b)) or v.nominal
         if (outside := beyond > CLEAR * size).any():
             k = int(outside.argmax())
             first = np.interp(0.0, beyond[k - 1 : k + 1], t[k - 1 : k + 1]) if k else t[0]
