@@ -105,11 +105,15 @@ class PeriodicOrbit(Showing):
 
     @property
     def drift(self) -> dict[str, float]:
-        """Change of each cyclic state in a period, such as the angle of a machine that turns.
+        """Change in a period of each cyclic state (`Model.cyclic`), and of each angle that turns.
 
-        No equation or event depends on a cyclic state, so it need not return to its start.
+        No equation or event depends on a cyclic state, or changes by a whole turn of an angle.
         """
-        return {name: self.run.final[name] - self.x[name] for name in self.model.cyclic}
+        change = {
+            name: end - self.x[name] for name, end in self.run.final.items() if name in self.x
+        }
+        turning = [name for name in self.model.angles if abs(change[name]) > np.pi]
+        return {name: change[name] for name in (*self.model.cyclic, *turning)}
 
     def amplitude(self, name: str) -> float:
         """Return half of the difference between the largest and smallest value of a signal."""
@@ -168,6 +172,8 @@ def periodic_orbit(
     """Return the periodic orbit near a guess, stable or unstable, by shooting.
 
         x(T) = x(0),   T unknown   or   x(T/2) = -x(0) of a symmetric orbit
+
+    Cyclic states and whole turns of angles are left out (`PeriodicOrbit.drift`).
 
     Newton's method uses the derivatives of the flow through stick and slip. Events of laws with
     modes stay events: there is no smoothing. The order of the events may change on the way.
@@ -258,7 +264,7 @@ def _fraction(orbit: PeriodicOrbit, problem: OrbitShooting) -> int:
     parts = [n for n in PARTS if n % 2 or not orbit.symmetric]
     at = orbit.run.at(np.array([0.0, *(orbit.period / n for n in parts)]))
     states = np.array([at[name] for name in orbit.x])
-    off = np.abs(states[:, 1:] - states[:, :1]) / problem.scale[:, None]
+    off = np.abs(problem.off(states[:, 1:] - states[:, :1])) / problem.scale[:, None]
     off = off[problem.returning].max(axis=0)
     return max([1, *(n for n, x in zip(parts, off, strict=True) if x < 10 * CLOSED * orbit.rtol)])
 
@@ -349,7 +355,7 @@ def _returning(
     times = run.looks[run.looks >= 0.5 * part]
     at = run.at(times)
     values = problem.signs[:, None] * np.array([at[name] for name in names])
-    off = (values - np.array([*x0.values()])[:, None]) / problem.scale[:, None]
+    off = problem.off(values - np.array([*x0.values()])[:, None]) / problem.scale[:, None]
     return run, float(times[int(np.argmin(np.abs(off[problem.returning]).max(axis=0)))])
 
 
@@ -381,7 +387,7 @@ def _orbit(
         model, at.time, x0=x, u=problem.u, p=p, rtol=rtol, t_eval=(0.0, at.time), method=METHOD
     )
     ends = np.array([finer[name] for name in x])
-    off = np.abs(problem.signs * ends[:, 1] - ends[:, 0]) / problem.scale
+    off = np.abs(problem.off(problem.signs * ends[:, 1] - ends[:, 0])) / problem.scale
     error = float(off[problem.returning].max(initial=0.0))
     period = (1 + symmetric) * at.time
     values = dict(zip((v.name for v in model.p), model.values("p", p).tolist(), strict=True))
