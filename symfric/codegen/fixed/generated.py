@@ -212,11 +212,11 @@ SLOWEST = (0.1, 1e-2, 1e-3)
 
 
 def _settled(block: Block, found: Bounds) -> list[str]:
-    """Return sentences about the error of a single state after any number of steps.
+    """Return sentences that estimate the error of a single state after any number of steps.
 
     A step multiplies the error e of the state by at most k, its derivative, and adds the error d of
-    one step. If e is below d / (1 - k) in every box, it remains so. The derivative of an
-    exponential step is monotone; its maximum over a box is at a corner.
+    one step. If e is below d / (1 - k) in every box, it remains so. k is the maximum over the
+    corners of a box, which is that of the box if the derivative is monotone.
     """
     if len(block.states) != 1:
         return []
@@ -233,8 +233,9 @@ def _settled(block: Block, found: Bounds) -> list[str]:
     for share in SLOWEST:
         total = float(errors[least >= 0.5 * share * most].max(initial=0.0))
         sentences.append(
-            f"While |{first.name}| >= {share * most:g} {first.unit}, rounding adds up to at most "
-            f"{_above(total)} {state.unit} of {state.name}, for any number of steps."
+            f"While |{first.name}| >= {share * most:g} {first.unit}, the errors of all steps add up to "
+            f"{_above(total)} {state.unit} of {state.name}: an estimate, with the contraction of a "
+            "step at the corners of the ranges."
         )
     return sentences
 
