@@ -13,8 +13,9 @@ BIN := $(VENV)/bin
 demo: $(VENV)/.runtime
 	$(BIN)/symfric demo --out out
 
+# `make test SHARE=7/31` also runs the slow tests of a share.
 test: $(VENV)/.test
-	$(ONE_THREAD) $(BIN)/python -m pytest -n auto --dist loadfile
+	$(ONE_THREAD) $(BIN)/python -m pytest -n auto --dist loadfile $(if $(SHARE),--share $(SHARE) -m "not slow or due")
 
 # Build the pages in out/docs. SYMFRIC_DOCS=quick computes the gallery of the papers at reduced size;
 # SYMFRIC_DOCS=keep reuses all existing pictures.

@@ -20,7 +20,7 @@ Contents; `help` describes each name:
     drives      Drive: motor, gear and encoder by their nameplate; driven(model, drive) adds them
     running     simulate, prepare for many calls, simulate_many, stepper, flow; inputs as numbers,
                 functions of time or samples, Hold and Linear (rate_of: their rate); SolveError,
-                Status of failed runs, OverloadWarning, EnergyWarning of doubtful runs
+                Status of failed runs, OverloadWarning, EnergyWarning, LimitWarning of doubtful runs
     results     Trajectory (run["x"], run.at(times), run.at(run.step_times), run.extremes, plot,
                 animate, save, to_csv, to_dataframe), load_run, Statistics, Plant, report; Ensemble
                 (varied, extremes, plot, save, to_dataframe), load_ensemble; for_print
@@ -61,6 +61,7 @@ if TYPE_CHECKING:
     from symfric.foundation.parameters import symbolise as symbolise
     from symfric.foundation.parameters import with_values as with_values
     from symfric.foundation.status import EnergyWarning as EnergyWarning
+    from symfric.foundation.status import LimitWarning as LimitWarning
     from symfric.foundation.status import OverloadWarning as OverloadWarning
     from symfric.foundation.status import SolveError as SolveError
     from symfric.foundation.status import Status as Status

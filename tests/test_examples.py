@@ -146,6 +146,10 @@ def hunting_drive(printed: str) -> bool:
     return 10 < below < 30 and above == 0 and "k_d = 9.12344" in printed
 
 
+def many_machines(printed: str) -> bool:
+    return printed.endswith("40000 machines in 4 blocks, 40000 within the range of the bins\n")
+
+
 LONG = {
     *(
         "adapt_drive",
@@ -168,7 +172,7 @@ CHECKS = dict.fromkeys(LONG, motion_is_verified) | {
         *(mpc_drive, out_and_back, identify_arm, identify_pendulum, identify_emps, opti_lugre),
         *(identify_raw_files, identify_franka, identify_excitation, robot_feed_forward),
         *(adapt_drive, compensate_drive, rabinowicz, learn_drive, drive_unit, hunting_drive),
-        hardware_in_the_loop,
+        *(hardware_in_the_loop, many_machines),
     )
 }
 CHECKS["out_and_back"] = lambda text: motion_is_verified(text) and out_and_back(text)

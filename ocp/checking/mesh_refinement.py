@@ -5,6 +5,7 @@ Meshes are refined only where the estimates require it.
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from itertools import groupby
 from math import ceil, inf, sqrt
 from time import perf_counter
 from typing import NamedTuple, final
@@ -336,6 +337,6 @@ def _outside(arcs: Sequence[Arc], goals: Goals) -> list[NDArray[np.bool_]]:
     The simulations restart at optimised nodes, so they remain near the optimised motion.
     """
     masks = [np.zeros(arc.intervals, dtype=bool) for arc in arcs]
-    for run in restarted(arcs, 10 * goals.local)[0]:
-        masks[run.arc.number] |= left_between(run, goals.outside)
+    for number, runs in groupby(restarted(arcs, 10 * goals.local)[0], lambda run: run.arc.number):
+        masks[number] = left_between([*runs], goals.outside)
     return masks

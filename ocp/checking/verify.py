@@ -146,15 +146,19 @@ def _worst(run: SimulatedArc, kept: _Kept) -> tuple[float, float, float]:
     return best
 
 
-def left_between(run: SimulatedArc, tolerance: float) -> NDArray[np.bool_]:
-    """Return a mask (N,) of intervals that violate a bound or path condition by > `tolerance`."""
-    mask = np.zeros(run.arc.intervals, dtype=bool)
-    looks = run.looks
-    interval = np.searchsorted(run.arc.times, looks, side="right") - 1
-    for kept in _kept(run.arc, peaks=True):
-        values = run.of(kept.expression, looks)[0]
-        outside = kept.outside(values) > tolerance * kept.magnitude(run, looks)
-        mask[np.minimum(interval[outside], mask.size - 1)] = True
+def left_between(runs: Sequence[SimulatedArc], tolerance: float) -> NDArray[np.bool_]:
+    """Return a mask (N,) of intervals that violate a bound or path condition by > `tolerance`.
+
+    The tolerance is relative to the largest magnitude of the condition in all `runs` of the arc.
+    """
+    arc = runs[0].arc
+    mask = np.zeros(arc.intervals, dtype=bool)
+    for kept in _kept(arc, peaks=True):
+        size = max(kept.magnitude(run, run.looks) for run in runs)
+        for run in runs:
+            outside = kept.outside(run.of(kept.expression, run.looks)[0]) > tolerance * size
+            interval = np.searchsorted(arc.times, run.looks[outside], side="right") - 1
+            mask[np.minimum(interval, mask.size - 1)] = True
     return mask
 
 

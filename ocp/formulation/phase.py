@@ -16,6 +16,7 @@ from ocp.formulation.changed_models import Form, Forms
 from ocp.formulation.expressions import Cost, Signals, arguments
 from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar, is_number
+from symfric.foundation.storable import agree
 from symfric.model import Model, check_model
 
 Array = NDArray[np.float64]
@@ -350,6 +351,18 @@ class Span:
     joins: tuple[Join, ...]
     softened: tuple[Row, ...] = ()
     absolutes: tuple[Row, ...] = ()
+
+    def check_fields(self) -> None:
+        """Raise an error if a file contains names that the model does not have."""
+        x, z, u, p = ({v.name for v in getattr(self.model, k)} for k in "xzup")
+        agree(
+            "Span",
+            {*self.boxes} == x | z | u,
+            all({*ranges} == x for ranges in self.nodes.values()),
+            all({*ranges} == u for ranges in self.inputs_at.values()),
+            p.issuperset(self.chosen),
+            self.p.shape == (len(p),),
+        )
 
     @property
     def penalised(self) -> tuple[Row, ...]:

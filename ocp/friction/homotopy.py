@@ -144,13 +144,13 @@ def sharpened(
     factor, steady = FACTOR, True
     yield path.sharp(step, steady)
     while step.good and step.level > last * 1.001:
-        level = max(step.level / factor, last)
+        level, solves = max(step.level / factor, last), len(path.spent)
         following = path.narrower(step, level)
         if following.ended:
             yield path.sharp(following, False)
             return
         if following.good:
-            if following.outcome.statistics.iterations <= QUICK:
+            if path.spent[solves].iterations <= QUICK:  # not those on refined meshes
                 factor = min(1.5 * factor, FACTOR)
             step = following
             yield path.sharp(step, steady)

@@ -79,8 +79,9 @@ SURE = 1.5
 """Factor by which a margin exceeds the share of the static level that a law does not reach."""
 LEAST_INTERVALS = 40
 MOST = 800
-GROWTH = 5.0
-"""Largest growth of the number of intervals in one pass."""
+LEAST_GROWTH, GROWTH = 1.1, 5.0
+"""Smallest growth of the number of intervals that reduces the loss further, and largest growth in
+one pass."""
 
 
 def rests_inside(solved: SolvedSequence) -> Legs | None:
@@ -345,8 +346,8 @@ def _fine(modes_solver: ModeSolver, solved: SolvedSequence) -> SolvedSequence:
         loss = min(solved.loss, left)
         exact = max(float(own.max()) for own in local) <= LOCAL
         outside = solved.overloaded
-        agree = min(ideal, left) <= allowed
-        if agree and exact and loss <= allowed and not any(own.any() for own in outside):
+        agree, inside = min(ideal, left) <= allowed, not any(own.any() for own in outside)
+        if agree and exact and inside and loss <= allowed:
             break
         least, trust = 0.0 if agree else HALVED * LOCAL, loss / max(solved.loss, ZERO)
         errors = [
@@ -357,6 +358,9 @@ def _fine(modes_solver: ModeSolver, solved: SolvedSequence) -> SolvedSequence:
             t.meshes, errors, [()] * len(errors), local=LOCAL, loss=allowed / 2, most=MOST,
             growth=GROWTH,
         )  # fmt: skip
+        full = sum(mesh.size - 1 for mesh in meshes) < LEAST_GROWTH * solved.intervals
+        if full and exact and inside:
+            break
         parts = solved.legs, solved.discretisation, meshes
         finer = modes_solver.on(*parts, solved.known, 1e-4)
         if not finer.ok:  # in a flat minimum the solution may be far from the start

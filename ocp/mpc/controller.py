@@ -346,7 +346,7 @@ def controller_of(
     if measured is not None:
         measurable = checks.names("to_mpc: measured", measured, measurable)
     bounds = {limit.name: i for i, limit in enumerate(h.limits)}
-    boxes = np.array([span.boxes.get(name, (-np.inf, np.inf)) for name in inputs])
+    boxes = np.array([span.boxes[name] for name in inputs])
     parameters = dict(zip((v.name for v in span.model.p), span.p.tolist(), strict=True))
 
     def control(v: Variable) -> Control:

@@ -20,6 +20,7 @@ Source: Bryson and Ho, Applied Optimal Control, 1975, 2.7, 3.1; Garg et al., Aut
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import Any, final
 
 import casadi as ca
@@ -31,6 +32,7 @@ from ocp.transcription.blocks import Piece
 from ocp.transcription.program import Iterate, cost_weight
 from ocp.transcription.transcribe import Transcription
 from ocp.transcription.unknowns import SpanPoints, Values
+from symfric.foundation.storable import agree
 
 Sparse = Any
 """Sparse matrix of SciPy, which has no stubs."""
@@ -52,6 +54,23 @@ class Optimum:
     transcription: Transcription
     iterate: Iterate
     values: Array
+
+    def check_fields(self) -> None:
+        """Raise an error if a file contains meshes or multipliers that do not fit its problem."""
+        made, found = self.transcription, self.iterate
+        meshes = [mesh.tolist() for mesh in made.meshes if mesh.ndim == 1 and mesh.size > 1]
+        agree(
+            "Optimum",
+            len(meshes) == len(made.meshes) == len(made.problem.spans),
+            all([mesh[0], mesh[-1]] == [0.0, 1.0] for mesh in meshes),
+            all(a < b for mesh in meshes for a, b in pairwise(mesh)),
+        )
+        agree(
+            "Optimum",
+            found.w.shape == found.lam_w.shape == made.program.lower_w.shape,
+            found.lam_g.shape == made.program.lower_g.shape,
+            self.values.shape == made.program.values.shape,
+        )
 
     @cached_property
     def slope(self) -> Array:
@@ -82,9 +101,10 @@ class Optimum:
     def residual(self) -> float:
         """Largest residual of stationarity, relative to the largest term of the Lagrangian."""
         lam_w, (_, J) = self.iterate.lam_w, self.rows
-        total = self.slope + J.T @ self.iterate.lam_g + lam_w
-        terms = abs(J).T @ np.abs(self.iterate.lam_g) + np.abs(self.slope) + np.abs(lam_w)
-        return float(np.abs(total).max() / max(terms.max(), 1e-300))
+        with np.errstate(invalid="ignore"):  # NaN for multipliers that are not finite
+            total = self.slope + J.T @ self.iterate.lam_g + lam_w
+            terms = abs(J).T @ np.abs(self.iterate.lam_g) + np.abs(self.slope) + np.abs(lam_w)
+            return float(np.abs(total).max() / max(terms.max(), 1e-300))
 
     @cached_property
     def points(self) -> Values:

@@ -96,10 +96,9 @@ class Axis:
         )
 
     @property
-    def velocity_noise(self) -> float:
-        """Standard deviation of the difference of the encoder [m/s]."""
-        variance = self.drawn["count"] ** 2 * (1 / 12 + self.drawn["noise"] ** 2)
-        return float(np.sqrt(2.0 * variance) / self.controller.h)
+    def position_noise(self) -> float:
+        """Standard deviation of the error of the encoder [m]."""
+        return self.drawn["count"] * float(np.sqrt(1 / 12 + self.drawn["noise"] ** 2))
 
     def loops(self, name: str = "", scales: Mapping[str, Any] | None = None, **how: Any) -> Loop:
         """Run the loop with an estimator, or with given scales."""
@@ -114,8 +113,9 @@ class Axis:
         worn["offset"] = d["load"] * (self.reference.t > d["at"] * self.t_end)
         if name:
             how["estimator"] = MAKE[name](
-                believed, mass=d["mass"], noise=self.velocity_noise, valid=self.controller.limit
-            )
+                believed, mass=d["mass"], valid=self.controller.limit,
+                noise=np.sqrt(2.0) * self.position_noise / self.controller.h,
+            )  # fmt: skip
         found = close_loop(
             plant, self.reference, block, controller=self.controller, p=worn,
             noise=d["noise"] * d["count"], seed=self.seed, cases={"run": scales or {}}, **how,
@@ -132,8 +132,7 @@ class Axis:
         step = EVERY * self.controller.h
         force = run.force[:size].reshape(-1, EVERY).mean(axis=1)
         random = np.random.default_rng(self.seed)
-        noise = self.drawn["count"] * np.sqrt(1 / 12 + self.drawn["noise"] ** 2)
-        x = run.x[:size:EVERY] + noise * random.standard_normal(force.size)
+        x = run.x[:size:EVERY] + self.position_noise * random.standard_normal(force.size)
         walk = np.sqrt(2 / 60)  # of the spread within a minute, as for the other estimators
         found = estimate(
             model,
@@ -142,7 +141,7 @@ class Axis:
             horizon=10,
             unknown=["N", "offset"],
             noise={
-                "x": noise, "N": walk, "offset": walk * level,
+                "x": self.position_noise, "N": walk, "offset": walk * level,
                 "v": 0.05 * level * np.sqrt(step) / self.drawn["mass"],
             },
             spread={"N": 1.0, "offset": level, "x": 1e-3, "v": 1e-2},

@@ -55,15 +55,16 @@ def analyse(
     model, first, until = _machine(scene, laws, settings, preset, law_of, name, x0, t_end)
     own = next(v.name for v in model.x if v.kind != MODE) if state is None else state
     check_names("--state", [own], [v.name for v in model.x])
-    (free,) = (v for v in model.p if v.name == name)
-    p = {name: _inside(free, low, high)}
+    (free,) = (v for v in (*model.u, *model.p) if v.name == name)
+    given = {name: _inside(free, low, high)}
+    u, p = (given, {}) if free in model.u else ({}, given)
     with output.progress(f"analyse {scene}") as tell:
         if start == "run":
-            run = simulate(model, until, x0=first, p=p, progress=tell)
-            orbit = periodic_orbit(model, run, p=p)
+            run = simulate(model, until, x0=first, u=u, p=p, progress=tell)
+            orbit = periodic_orbit(model, run, u=u, p=p)
             branches = [continuation(orbit, name, (low, high), points=points, step=longest)]
         else:
-            at = equilibrium(model, p=p, guess=first or None)
+            at = equilibrium(model, u=u, p=p, guess=first or None)
             rest = continuation(at, name, (low, high), points=points, step=longest)
             branches = [rest]
             for hopf in rest.located("Hopf"):
@@ -104,15 +105,15 @@ def _machine(
         make = function_of_file("analyse", scene, opt.numbers("--set", settings))
         model = make(chosen)
         check_model(f"analyse '{scene}'", model)
-        check_names(f"--over of {scene}", [name], [v.name for v in model.p])
+        check_names(f"--over of {scene}", [name], [v.name for v in (*model.p, *model.u)])
         return model, opt.numbers("--x0", x0), 100.0 if t_end is None else t_end
     (machine,) = scenes_with(scene, laws, settings, preset, law_of).values()
-    model = machine.model([name])
+    model = machine.model([] if name in machine.inputs else [name])
     given = driven(machine, model, None, x0, t_end)
-    if given.signals:
+    if others := [one for one in given.signals if one != name]:
         raise ValueError(
-            f"analyse {scene}: expected a machine without inputs of time, got "
-            f"{', '.join(given.signals)}; use periodic_orbit(..., period=) in Python"
+            f"analyse {scene}: expected no inputs of time except that of --over, got "
+            f"{', '.join(others)}; use periodic_orbit(..., period=) in Python"
         )
     return model, given.start, max(given.until, 5 * machine.t_end) if t_end is None else t_end
 

@@ -14,6 +14,7 @@ from symfric.cli import options as opt
 from symfric.cli import output
 from symfric.cli.codegen_report import report
 from symfric.cli.controllers import REALS, write_controllers
+from symfric.cli.fixed_point import FIXED, write_fixed
 from symfric.cli.machines import kind_of, settable, with_set
 from symfric.cli.options import Strings
 from symfric.codegen import (
@@ -104,6 +105,7 @@ def codegen(
     scene: str | None = None,
     method: str | None = None,
     real: str | None = None,
+    ranges: Strings = None,
     step_size: float | None = None,
     name: str | None = None,
     fold: bool = False,
@@ -145,6 +147,8 @@ def codegen(
     Example: symfric codegen --mpc problem.py --real float --core m4f --out build
 
     Example: symfric codegen fit.json --estimator recursive --adaptation noise=1e-4 --out build
+
+    Example: symfric codegen stribeck --real fixed --range v=-1:1 --range N=0:20 --out build
     """
     given = opt.changed(codegen, locals())
     check_names("--core", core or (), CORES)
@@ -161,6 +165,11 @@ def codegen(
     texts = opt.assignments("--set", settings)
     chosen = None if inverse_dynamics else chosen_law(fit, law, accept or (), texts)
     subject = subject_of(chosen, scene, compensator, estimator)
+    if real == FIXED or ranges:
+        if chosen is None or not isinstance(chosen.law, Law):
+            raise ValueError(f"--real fixed: expected a law, got {subject}")
+        made = opt.with_settings(chosen.law, chosen.text, texts)
+        return write_fixed(out, made, given, ranges, step_size, name, core, compiler, json)
     kind = ("double" if subject == PLANT else "both") if real is None else real
     check_names("--real", [kind], REALS)
     check_applicable(subject, [option for option in APPLIES if option in given])

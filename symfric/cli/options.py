@@ -170,6 +170,8 @@ def named_in_file(
     file, name = Path(f"{path}.py"), name.removeprefix(":") or default
     if not file.is_file():
         raise ValueError(f"{command}: expected a Python file, got '{file}', which does not exist")
+    if not name.isidentifier():
+        raise checks.refused(command, "FILE.py:NAME, and --set for parameters", text)
     with errors_with_line(command, file):
         every = runpy.run_path(str(file))
     if name not in every:
@@ -197,11 +199,10 @@ def errors_with_line(command: str, file: Path, *plain: type[Exception]) -> Gener
         yield
     except plain:
         raise
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         frames = reversed(traceback.extract_tb(error.__traceback__))
         own = getattr(error, "lineno", None)  # for syntax errors
         line = next((f.lineno for f in frames if f.filename == str(file)), own)
-        raise ValueError(
-            f"{command}: expected a file that runs, got {type(error).__name__} in line {line} of "
-            f"'{file}': {error}"
-        ) from error
+        place = f" in line {line}" * bool(line)
+        got = f"{type(error).__name__}{place} of '{file}': {error}"
+        raise ValueError(f"{command}: expected a file that runs, got {got}") from error

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     )
     from symfric.codegen.contract import Proof as Proof
     from symfric.codegen.contract import prove as prove
+    from symfric.codegen.fixed.generated import FixedPoint as FixedPoint
+    from symfric.codegen.fixed.generated import fixed_point as fixed_point
     from symfric.codegen.generated import Generated as Generated
     from symfric.codegen.generated import generate as generate
     from symfric.codegen.verification import Check as Check

@@ -112,7 +112,9 @@ def _routine(
     names = [[v.name for v in of] for of in block.groups.values()]
     given = representable(whole, c.real), names, targets, c.real
     free = {entry: place for entry, place in loads.items() if entry not in checked}
-    if arrays.read or arrays.written:
+    if c.author is not None:
+        code = c.author.code(targets, free)
+    elif arrays.read or arrays.written:
         code = emit_rolled(*given, arrays, free)
     else:
         code = emit(*given, loads=free)
@@ -168,6 +170,8 @@ def source(c: CBlock) -> str:
     )
     if c.guards:
         bodies = helpers(c, bodies) + bodies
+    if c.author is not None:
+        bodies = c.author.helpers(bodies) + bodies
     headers = ["stdbool"] * ("bool " in bodies) + ["stdint", "string"] * c.guards
     includes = "".join(f"#include <{header}.h>\n" for header in headers)
     return (
@@ -211,7 +215,7 @@ def header(c: CBlock) -> str:
         TEMPLATES / "header.h",
         sheet=block_comment([*banner(block, f"{name}.h"), *sheet(c)]),
         guard=f"{name.upper()}_H",
-        structs=structs,
+        structs=("#include <stdint.h>\n\n" if c.real.whole else "") + structs,
         status=constants(c) + "\n" if c.guards else "",
         prototypes="\n".join(f"/* {r.doc} */\n{r.head};\n" for r in routines(c)),
     )

@@ -172,7 +172,7 @@ def boundary(
     rows = np.array([*reversed(sides[0]), node.z, *sides[1]])
     rates = np.array([curve.critical(row).imag for row in rows])
     periods = 2 * np.pi / rates if curve.hopf else np.zeros(len(rows))
-    message = "; ".join(_reason(side, span, points // 2) for side in sides)
+    message = "; ".join(dict.fromkeys(_reason(side, span, points // 2) for side in sides))
     return Boundary(
         model, special.kind, (branch.parameter, parameter), rows[:, -2:],
         rows[:, : len(model.x)], periods, message,

@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING, Any, final
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.dynamics.linear import NEUTRAL, SLOWEST
+from symfric.dynamics.orbit import NEUTRAL as UNDECIDED
 from symfric.dynamics.orbit import PeriodicOrbit, guessed, periodic_orbit
 from symfric.foundation import checks
 from symfric.foundation.numeric import Array
 from symfric.foundation.parameters import check_names
-from symfric.foundation.shown import Showing, Shown, TextTable
+from symfric.foundation.shown import Showing, Shown, TextTable, among
 from symfric.integrator import Ensemble, Input
 from symfric.model import Model
 from symfric.results.stored import Format
@@ -88,7 +90,10 @@ class Branch(Showing):
 
     @property
     def exponents(self) -> NDArray[np.complex128]:
-        """Eigenvalues [1/s] of equilibria, or Floquet multipliers of orbits, shape (n, k)."""
+        """Eigenvalues [1/s] of equilibria, or Floquet multipliers of orbits, shape (n, k).
+
+        The zero eigenvalues of cyclic states, on which no equation depends, are left out.
+        """
         return self.parts[:, :, 0] + 1j * self.parts[:, :, 1]
 
     @property
@@ -102,14 +107,24 @@ class Branch(Showing):
         return "periodic orbits" if self.of_orbits else "equilibria"
 
     @property
-    def stable(self) -> NDArray[np.bool_]:
-        """True for each point at which all deviations decay, shape (n,).
+    def stability(self) -> NDArray[np.int8]:
+        """1 where all deviations decay, -1 where one grows, 0 where neither is certain, shape (n,).
 
-        There is no neutral band: a deviation that neither grows nor decays, such as that of a
-        conserved quantity, counts by the sign of its rounding error. `exponents` shows its size.
+        The limits are those of `LinearModel.stable` and `PeriodicOrbit.stable`.
         """
-        growth = np.abs(self.exponents) - 1 if self.of_orbits else self.exponents.real
-        return np.nan_to_num(growth, nan=-1.0).max(axis=1, initial=-1.0) < 0
+        size = np.abs(self.exponents)
+        if self.of_orbits:
+            growth, neutral = size - 1, UNDECIDED
+        else:
+            largest = np.fmax.reduce(size, axis=1, initial=SLOWEST, keepdims=True)
+            growth, neutral = self.exponents.real / largest, NEUTRAL
+        greatest = np.fmax.reduce(growth, axis=1, initial=-1.0)
+        return np.where(np.abs(greatest) <= neutral, 0, -np.sign(greatest)).astype(np.int8)
+
+    @property
+    def stable(self) -> NDArray[np.bool_]:
+        """True for each point at which all deviations decay, shape (n,)."""
+        return self.stability > 0
 
     def located(self, kind: str) -> tuple[Special, ...]:
         """Return the special points of a kind, such as "Hopf"; see `Special.kind`."""
@@ -136,7 +151,7 @@ class Branch(Showing):
         self, state: str, *others: "Branch", runs: Sequence[Ensemble] = (),
         path: str | Path | None = None,
     ) -> "Figure":  # fmt: skip
-        """Plot a state over the parameter: stable parts solid, unstable ones dashed.
+        """Plot a state over the parameter: stable parts solid, unstable ones dashed, others dotted.
 
         Orbits are shown by their smallest and largest value.
 
@@ -163,7 +178,7 @@ class Branch(Showing):
             special = [
                 (s.kind, s.value, float(b.high[k, i])) for s, k in zip(b.special, at, strict=True)
             ]
-            rows = b.values[order], b.low[order, i], b.high[order, i], b.stable[order]
+            rows = b.values[order], b.low[order, i], b.high[order, i], b.stability[order]
             curves.append(Plotted(b.content, *rows, special))
         (free,) = (v for v in self.model.p if v.name == self.parameter)
         labels = f"{self.parameter} [{free.unit}]", f"{state} [{self.model.x[i].unit}]"
@@ -184,9 +199,11 @@ class Branch(Showing):
     def shown(self) -> Shown:
         """Return the range of the parameter and the special points."""
         low, high = self.values.min(initial=np.inf), self.values.max(initial=-np.inf)
+        words = {1: "stable", -1: "unstable", 0: "on the limit of stability"}
+        counts = {word: int((self.stability == key).sum()) for key, word in words.items()}
         lines = [
-            f"{self.values.size} {self.content}, {int(self.stable.sum())} of them stable, "
-            f"{self.parameter} from {low:.6g} to {high:.6g}",
+            f"{self.values.size} {self.content}, {self.parameter} from {low:.6g} to {high:.6g}",
+            among(f"{count} {word}" for word, count in counts.items() if count),
             self.message,
         ]
         rows = [
@@ -203,7 +220,7 @@ class Branch(Showing):
             "kind": "orbits" if self.of_orbits else "equilibria",
             "values": self.values.tolist(),
             "periods": self.periods.tolist(),
-            "stable": self.stable.tolist(),
+            "stable": [{1: True, -1: False}.get(k) for k in self.stability.tolist()],
             "low": self.low.tolist(),
             "high": self.high.tolist(),
             "states": [v.name for v in self.model.x],

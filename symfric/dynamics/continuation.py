@@ -1,7 +1,9 @@
 """Continuation of equilibria and periodic orbits in a parameter, through folds and grazing."""
 
+from collections import deque
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -18,6 +20,7 @@ from symfric.foundation.parameters import check_names
 from symfric.integrator.equations.inputs import Input
 from symfric.model import Model
 
+At = TypeVar("At", bound=Equilibrium | PeriodicOrbit)
 INTERRUPTED = "interrupted by the user"
 SMALL = 1e-3
 """First amplitude of orbits from a Hopf point, relative to the magnitudes of the states."""
@@ -44,7 +47,7 @@ def continuation(
     Args:
         start: isolated equilibrium, or a periodic orbit that is not `symmetric`. A given period
             does not change.
-        parameter: name of a free parameter of the model.
+        parameter: name of a free parameter of the model, or of an input that is constant.
         between: smallest and largest value of the parameter, within its bounds.
         points: largest number of points.
         step: longest step, relative to the magnitudes of states, period and range of the parameter.
@@ -59,6 +62,8 @@ def continuation(
     where = "continuation"
     if not isinstance(start, Equilibrium | PeriodicOrbit):  # pyright: ignore[reportUnnecessaryIsInstance]
         raise checks.refused(f"{where}: start", "an equilibrium or a periodic orbit", start)
+    if parameter in start.u:
+        start = _with_parameter(start, parameter)
     model = start.model
     hint = f"free it when the model is made, such as rabinowicz(law, free=['{parameter}'])"
     check_names(f"{where}: parameter", [parameter], [v.name for v in model.p], hint)
@@ -81,10 +86,7 @@ def continuation(
         curve, z = _equilibria(start, parameter, span)
     node = curve.at(z)
     up = tangent(curve, node, _unit(z.size))
-    back = _traced(curve, node, -up, span, points // 2, step)
-    on = Trace([back.points[0]])
-    if back.message != INTERRUPTED:
-        on = _traced(curve, node, up, span, points + 1 - len(back.points), step)
+    back, on = _traced(curve, node, [-up, up], span, points, step)
     driven = isinstance(start, PeriodicOrbit) and start.driven
     return _joined(model, parameter, start.u, dict(start.p), [back, on], driven=driven)
 
@@ -123,8 +125,18 @@ def orbits_from(
     z = np.concatenate([hopf.x, [hopf.period, hopf.value]])
     node, _ = corrected(curve, z + SMALL * along * scale, along)
     tau = tangent(curve, node, along)
-    part = _traced(curve, node, tau, span, points, step)
+    (part,) = _traced(curve, node, [tau], span, points, step)
     return _joined(model, branch.parameter, branch.u, branch.p, [Trace(), part], driven=False)
+
+
+def _with_parameter(start: At, name: str) -> At:
+    """Return the start with a constant input as the last parameter of its model."""
+    model, u = start.model, dict(start.u)
+    value = checks.number(f"continuation: input {name}", u.pop(name))
+    (given,) = (v for v in model.u if v.name == name)
+    others = tuple(v for v in model.u if v is not given)
+    changed = replace(model, u=others, p=(*model.p, given))
+    return replace(start, model=changed, u=u, p={**start.p, name: value})
 
 
 def checked_span(
@@ -175,29 +187,50 @@ def _equilibria(
 
 
 def _traced(
-    curve: Family, node: Node, tau: Array, span: tuple[float, float], points: int, step: float
-) -> Trace:
-    """Return the part of the curve from `node` in the direction `tau`."""
-    trace = Trace([curve.point(node)])
+    curve: Family,
+    node: Node,
+    ways: list[Array],
+    span: tuple[float, float],
+    points: int,
+    step: float,
+) -> list[Trace]:
+    """Return the parts of the curve from `node` in each direction, extended in turn."""
+    first, reason = curve.point(node), f"ends after {points} points"
+    traces = [Trace([first]) for _ in ways]
+    running = deque(
+        (trace, _extended(curve, node, tau, span, step, trace))
+        for trace, tau in zip(traces, ways, strict=True)
+    )
     try:
-        for found in _steps(curve, node, tau, span, step, trace):
-            trace.locate(curve, found)
-            if last := at_edge(curve, found, span):
-                if last is not found.node:
-                    trace.points.append(curve.point(last))
-                trace.message = "ends at the given range"
-                break
-            trace.points.append(curve.point(found.node))
-            if (value := curve.vanishing(trace.points)) is not None:
-                trace.add("Hopf", curve, found.node, value)
-                trace.message = "ends at a Hopf point"
-                break
-            if len(trace.points) >= points:
-                trace.message = f"ends after {points} points"
-                break
+        while running and 1 + sum(len(trace.points) - 1 for trace in traces) < points:
+            if next(running[0][1], False):
+                running.rotate(-1)
+            else:
+                running.popleft()
     except KeyboardInterrupt:
-        trace.message = INTERRUPTED
-    return trace
+        reason = INTERRUPTED
+    for trace, _ in running:
+        trace.message = reason
+    return traces
+
+
+def _extended(
+    curve: Family, node: Node, tau: Array, span: tuple[float, float], step: float, trace: Trace
+) -> Iterator[bool]:
+    """Add points to the trace one by one; yield True as long as the curve continues."""
+    for found in _steps(curve, node, tau, span, step, trace):
+        trace.locate(curve, found)
+        if last := at_edge(curve, found, span):
+            if last is not found.node:
+                trace.points.append(curve.point(last))
+            trace.message = "ends at the given range"
+            return
+        trace.points.append(curve.point(found.node))
+        if (value := curve.vanishing(trace.points)) is not None:
+            trace.add("Hopf", curve, found.node, value)
+            trace.message = "ends at a Hopf point"
+            return
+        yield True
 
 
 def _steps(
@@ -258,7 +291,8 @@ def _joined(
     parts_of = np.full((len(points), max(found.size for found in exponents), 2), np.nan)
     for row, found in zip(parts_of, exponents, strict=True):
         row[: found.size] = np.column_stack([found.real, found.imag])
-    message = "; ".join(m for m in (back.message, on.message, *back.notes, *on.notes) if m)
+    ends = dict.fromkeys((back.message, on.message))
+    message = "; ".join(m for m in (*ends, *back.notes, *on.notes) if m)
     return Branch(
         model, name, dict(u), dict(p), np.array(values), np.array(x), np.array(periods), parts_of,
         np.array(low), np.array(high), sequences, tuple(special), message, driven,

@@ -113,9 +113,9 @@ class ModelEquations:
 
     @cached_property
     def cyclic(self) -> Indices:
-        """States on which neither equations nor constraints depend, without modes."""
-        used = ca.sum1(ca.DM(ca.jacobian_sparsity(ca.vertcat(self.f, self.constraints), self.y), 1))
-        return np.setdiff1d(np.flatnonzero(used.full()[0, : len(self.model.x)] == 0), self.modes)
+        """Indices of the states on which nothing depends."""
+        names, cyclic = [v.name for v in self.model.x], self.model.cyclic
+        return np.array([names.index(name) for name in cyclic], dtype=np.intp)
 
     @cached_property
     def algebraic(self) -> Indices:

@@ -195,7 +195,8 @@ class Orbits(Family):
         if self.problem.driven or len(points) < 2:
             return None
         one, other = points[-2:]
-        sizes = (((p.high - p.low) / self.scale[: p.x.size]).max() for p in (one, other))
+        own = self.problem.states
+        sizes = (((p.high - p.low)[own] / self.scale[own]).max() for p in (one, other))
         a, b = (float(size) ** 2 for size in sizes)
         if not b < min(a, VANISHES**2):
             return None
@@ -274,11 +275,12 @@ class Equilibria(Family):
         return "Hopf", 2 * np.pi / abs(float(values[k].imag)), direction
 
     def _modes(self, node: Node) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
-        """Return the eigenvalues of small deviations [1/s], and their directions in y."""
+        """Return the eigenvalues [1/s], without those of cyclic states, and directions in y."""
         linear = tangent(self.eq, *node.content)
         values: NDArray[np.complex128]
         values, vectors = (part.astype(complex) for part in np.linalg.eig(linear.A))
-        order = np.argsort(-values.real)
+        decided = np.sort(np.argsort(np.abs(values))[self.eq.cyclic.size :])  # theirs are zero
+        order = decided[np.argsort(-values[decided].real)]
         return values[order], (linear.T @ vectors).astype(complex)[:, order]
 
 

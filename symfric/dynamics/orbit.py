@@ -103,6 +103,18 @@ class PeriodicOrbit(Showing):
         """Names of the events of one period in their order."""
         return tuple(name for _, name in self.run.happened)
 
+    @property
+    def drift(self) -> dict[str, float]:
+        """Change in a period of each cyclic state (`Model.cyclic`), and of each angle that turns.
+
+        No equation or event depends on a cyclic state, or changes by a whole turn of an angle.
+        """
+        change = {
+            name: end - self.x[name] for name, end in self.run.final.items() if name in self.x
+        }
+        turning = [name for name in self.model.angles if abs(change[name]) > np.pi]
+        return {name: change[name] for name in (*self.model.cyclic, *turning)}
+
     def amplitude(self, name: str) -> float:
         """Return half of the difference between the largest and smallest value of a signal."""
         return self.cycle.amplitude(name)
@@ -126,6 +138,8 @@ class PeriodicOrbit(Showing):
         lines = [f"period {self.period:.9g} s, multipliers of size {sizes or 'none'}"]
         if self.events:
             lines.append(f"events: {', '.join(self.events)}")
+        units = {v.name: v.unit for v in self.model.x}
+        lines += [f"{n} changes by {d:.6g} {units[n]} in a period" for n, d in self.drift.items()]
         rows = list[tuple[str, ...]]()
         for v in self.model.x:
             low, high = self.cycle.extremes(v.name)
@@ -158,6 +172,8 @@ def periodic_orbit(
     """Return the periodic orbit near a guess, stable or unstable, by shooting.
 
         x(T) = x(0),   T unknown   or   x(T/2) = -x(0) of a symmetric orbit
+
+    Cyclic states and whole turns of angles are left out (`PeriodicOrbit.drift`).
 
     Newton's method uses the derivatives of the flow through stick and slip. Events of laws with
     modes stay events: there is no smoothing. The order of the events may change on the way.
@@ -236,19 +252,20 @@ def found(
     last = solved(problem, starts, part, p)
     _check(problem, last, ranges)
     orbit = _orbit(problem, p, last, symmetric)
-    if not driven and (n := _fraction(orbit, scale)) > 1:
+    if not driven and (n := _fraction(orbit, problem)) > 1:
         return found(
             model, orbit.run, 0.0, orbit.period / n, u, p, symmetric, m, rtol, driven=False
         )
     return orbit
 
 
-def _fraction(orbit: PeriodicOrbit, scale: Array) -> int:
+def _fraction(orbit: PeriodicOrbit, problem: OrbitShooting) -> int:
     """Return the largest n for which the orbit has returned after 1/n of its period."""
     parts = [n for n in PARTS if n % 2 or not orbit.symmetric]
     at = orbit.run.at(np.array([0.0, *(orbit.period / n for n in parts)]))
     states = np.array([at[name] for name in orbit.x])
-    off = np.abs((states[:, 1:] - states[:, :1]) / scale[:, None]).max(axis=0)
+    off = np.abs(problem.off(states[:, 1:] - states[:, :1])) / problem.scale[:, None]
+    off = off[problem.returning].max(axis=0)
     return max([1, *(n for n, x in zip(parts, off, strict=True) if x < 10 * CLOSED * orbit.rtol)])
 
 
@@ -338,8 +355,8 @@ def _returning(
     times = run.looks[run.looks >= 0.5 * part]
     at = run.at(times)
     values = problem.signs[:, None] * np.array([at[name] for name in names])
-    off = (values - np.array([*x0.values()])[:, None]) / problem.scale[:, None]
-    return run, float(times[int(np.argmin(np.abs(off).max(axis=0)))])
+    off = problem.off(values - np.array([*x0.values()])[:, None]) / problem.scale[:, None]
+    return run, float(times[int(np.argmin(np.abs(off[problem.returning]).max(axis=0)))])
 
 
 def _check(problem: OrbitShooting, at: LinearisedShooting, ranges: Array) -> None:
@@ -351,11 +368,10 @@ def _check(problem: OrbitShooting, at: LinearisedShooting, ranges: Array) -> Non
         end = problem.signs * part.end if part is at.segments[-1] else part.end
         if (np.abs(end - after)[modes] > MODE_CHANGED).any():
             raise ValueError(f"{where}, got one whose contacts do not return to their modes")
-    states = [v.name for v in model.x if v.kind != MODE]
+    states = [model.x[i].name for i in problem.states]
     reach = [part.run.extremes for part in at.segments]
     size = np.array([max(e[n][1] for e in reach) - min(e[n][0] for e in reach) for n in states])
-    own = np.array([r for r, v in zip(ranges, model.x, strict=True) if v.kind != MODE])
-    if (size < SMALL * own).all() and not problem.driven:
+    if (size < SMALL * ranges[problem.states]).all() and not problem.driven:
         raise ValueError(f"{where}, got an equilibrium; give a run with a larger motion")
 
 
@@ -371,7 +387,8 @@ def _orbit(
         model, at.time, x0=x, u=problem.u, p=p, rtol=rtol, t_eval=(0.0, at.time), method=METHOD
     )
     ends = np.array([finer[name] for name in x])
-    error = float((np.abs(problem.signs * ends[:, 1] - ends[:, 0]) / problem.scale).max())
+    off = np.abs(problem.off(problem.signs * ends[:, 1] - ends[:, 0])) / problem.scale
+    error = float(off[problem.returning].max(initial=0.0))
     period = (1 + symmetric) * at.time
     values = dict(zip((v.name for v in model.p), model.values("p", p).tolist(), strict=True))
     return PeriodicOrbit(

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -69,6 +69,14 @@ def portrait(run: Trajectory, x: str, y: str, path: str | Path | None) -> Figure
     return save(figure, path)
 
 
+STYLES: dict[int, tuple[Literal["-", "--", ":"], str]] = {
+    1: ("-", ""),
+    -1: ("--", "unstable"),
+    0: (":", "on the limit of stability"),
+}
+"""Line styles by stability, and their legend entries."""
+
+
 class Plotted(NamedTuple):
     """Branch in a bifurcation diagram.
 
@@ -76,7 +84,7 @@ class Plotted(NamedTuple):
         name: legend entry.
         values: parameter, shape (n,).
         low, high: smallest and largest value of a state, shape (n,); equal for equilibria.
-        stable: True for each stable point, shape (n,).
+        stability: 1, -1 or 0 for each stable, unstable or undecided point, shape (n,).
         special: (kind, parameter, value of the state) of each special point.
     """
 
@@ -84,7 +92,7 @@ class Plotted(NamedTuple):
     values: Array
     low: Array
     high: Array
-    stable: NDArray[np.bool_]
+    stability: NDArray[np.int8]
     special: Sequence[tuple[str, float, float]]
 
 
@@ -92,7 +100,7 @@ def bifurcation(
     curves: Sequence[Plotted], runs: Sequence[tuple[Array, Array, Array]], labels: tuple[str, str],
     path: str | Path | None,
 ) -> Figure:  # fmt: skip
-    """Plot branches over a parameter: stable parts solid, unstable ones dashed.
+    """Plot branches over a parameter: stable parts solid, unstable ones dashed, others dotted.
 
     Args:
         curves: the branches.
@@ -106,8 +114,8 @@ def bifurcation(
             axis.plot(values, side, "o", color=EDGE, mfc="none", markersize=4.5, mew=0.6, zorder=3)
     for k, curve in enumerate(curves):
         for side in (curve.low, curve.high):
-            for stable, style in ((True, "-"), (False, "--")):
-                shown = curve.stable == stable
+            for stability, (style, _) in STYLES.items():
+                stable, shown = stability > 0, curve.stability == stability
                 shown[:-1] |= shown[1:] & (not stable)
                 shown[1:] |= shown[:-1] & (not stable)
                 axis.plot(
@@ -133,8 +141,9 @@ def bifurcation(
 def _legend(figure: Figure, curves: Sequence[Plotted], with_runs: bool) -> None:
     """Add a legend below a bifurcation diagram."""
     handles = [Line2D([], [], color=colour(k), label=c.name) for k, c in enumerate(curves)]
-    if not all(curve.stable.all() for curve in curves):
-        handles.append(Line2D([], [], color=EDGE, linestyle="--", label="unstable"))
+    for stability, (style, label) in STYLES.items():
+        if label and any((curve.stability == stability).any() for curve in curves):
+            handles.append(Line2D([], [], color=EDGE, linestyle=style, label=label))
     if with_runs:
         handles.append(
             Line2D([], [], color=EDGE, marker="o", linestyle="", mfc="none", label="runs")

@@ -8,7 +8,8 @@ where S = 1, or the signs of a symmetric orbit, whose T is half of its period. T
 independent coordinates of each x_i (constraints of mechanisms and sticking contacts are kept), and
 T unless it is given. Without a given period, the correction of x_0 is orthogonal to its rate. The
 derivatives of phi are those of `simulate`, with saltation matrices at events. `solved` finds an
-orbit by damped Newton steps.
+orbit by damped Newton steps. Cyclic states, on which nothing depends, keep their start values and
+need not return, and angles return up to whole turns.
 """
 
 from collections.abc import Mapping
@@ -114,8 +115,25 @@ class OrbitShooting:
 
     @cached_property
     def states(self) -> Indices:
-        """Indices of the states that are not modes."""
-        return np.setdiff1d(np.arange(len(self.model.x)), self.eq.modes)
+        """Indices of the states that are neither modes nor cyclic."""
+        return np.setdiff1d(self.returning, self.eq.modes)
+
+    @cached_property
+    def returning(self) -> Indices:
+        """Indices of the states that are equal after a period: all but the cyclic ones."""
+        return np.setdiff1d(np.arange(len(self.model.x)), self.eq.cyclic)
+
+    @cached_property
+    def angles(self) -> Indices:
+        """Indices of the angles of which a whole turn changes nothing."""
+        names = self.model.angles
+        return np.flatnonzero([v.name in names for v in self.model.x])
+
+    def off(self, change: Array) -> Array:
+        """Return changes of the states, shape (nx, ...), without whole turns of angles."""
+        left = change.copy()
+        left[self.angles] -= 2 * np.pi * np.round(left[self.angles] / (2 * np.pi))
+        return left
 
     @cached_property
     def rate(self) -> ca.Function:
@@ -180,7 +198,7 @@ class OrbitShooting:
             chosen, _ = bases[after]
             rows, columns = slice(at[after], at[after + 1]), slice(at[i], at[i + 1])
             end, S = sign * part.end, sign[:, None] * part.S
-            r[rows] = (end - parts[after].start)[chosen]
+            r[rows] = self.off(end - parts[after].start)[chosen]
             J[rows, columns] += (S @ bases[i][1])[chosen]
             J[rows, at[after] : at[after + 1]] -= np.eye(chosen.size)
             if more:

@@ -100,7 +100,7 @@ class Near:
         if self.gaps[-1].share < GRAZES:
             return 0.0
         values = np.array([*run.states(run.looks).values()])
-        size = float((np.ptp(values, axis=1) / problem.scale).max())
+        size = float((np.ptp(values, axis=1) / problem.scale)[problem.states].max())
         return min(max(CLOSER * self._way(), 0.0), HALF * size)
 
     def _way(self) -> float:

@@ -1,6 +1,6 @@
 """Cost and accuracy of a step of a block on a Cortex-M core, and unit tests of kits on it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from math import inf, nan
 from pathlib import Path
@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.codegen.blocks.block import Block, CBlock
+from symfric.codegen.fixed.generated import FixedPoint
 from symfric.codegen.generated import Generated
-from symfric.codegen.runner import compiled, run_c, run_vm
+from symfric.codegen.runner import compiled, evaluated, run_c, run_vm
 from symfric.codegen.verification import motions
 from symfric.embedded.target import (
     BY,
@@ -27,6 +28,7 @@ from symfric.embedded.target import (
     by_casadi,
     find_tools,
     literals,
+    of_c,
     own,
 )
 from symfric.emitter.c99 import REALS, filled
@@ -147,24 +149,67 @@ def measure(
         words, instructions = counted(target, folder, source, parts, real, inputs, columns)
         results = words["rows"].view(c.real.kind).reshape(-1, columns).astype(float)
         equal = _equal(c, source, inputs, results)
-    means = instructions[steps:].reshape(-1, STRETCH).mean(axis=1).tolist()
     expected = run_vm(CBlock(block, c.real), inputs, results[:, : len(block.states)])
     return BlockMeasurement(
         block.name,
         real,
         core,
         by,
-        average=float(instructions[:steps].mean()),
-        maximum=float(round(instructions.max())),
-        regimes=dict(zip(further, means, strict=True)),
-        text=int(words["text"][0]),
-        library=int(words["library"][0]),
-        data=int(words["data"][0]),
-        stack=int(words["stack"][0]),
         error=_error(block, results, expected[:, :columns]),
         equal=equal,
         finite=bool(np.isfinite(results).all()),
+        **_costs(words, instructions, steps, further),
     )
+
+
+def measure_fixed(
+    made: FixedPoint,
+    core: str = "m0plus",
+    *,
+    flags: Sequence[str] = ("-O2",),
+    steps: int = STEPS,
+    tools: Tools | Absent | None = None,
+) -> BlockMeasurement:
+    """Measure a step in fixed point, as `measure` does; its error is that of the block.
+
+    Inputs are those of `measure`, clamped to their ranges.
+    """
+    checks.choice("embedded: core", core, CORES)
+    c, found = made.c, find_tools() if tools is None else tools
+    if isinstance(found, Absent):
+        return BlockMeasurement(
+            made.model.name, c.real.name, core, status=f"skipped: {found.advice}"
+        )
+    states, names = ([v.name for v in group] for group in (made.model.states, made.model.inputs))
+    further, ends = regimes(made.model), [*states, *made.model.outputs]
+    low, high = np.array([made.ranges[name] for name in names]).reshape(-1, 2).T
+    inputs = np.clip(np.vstack([day(made.model, steps), *further.values()]), low, high)
+    with TemporaryDirectory(prefix="symfric-") as name:
+        source, parts = of_c(c, Path(name))
+        given = Target(CORES[core], found, flags), Path(name), source, parts, c.real.name
+        whole = np.rint(inputs * made.scales(names))
+        words, instructions = counted(*given, whole, len(ends))
+        rows = words["rows"].view(np.int32).reshape(-1, len(ends)).astype(float)
+        equal = _equal(c, source, whole, rows)
+    before = np.vstack([np.zeros(len(states)), rows[:-1, : len(states)] / made.scales(states)])
+    expected = evaluated(made.model.step, before, np.zeros((len(rows), 0)), inputs)
+    return BlockMeasurement(
+        made.model.name, c.real.name, core,
+        error=_error(made.model, rows / made.scales(ends), expected), equal=equal, finite=True,
+        **_costs(words, instructions, steps, further),
+    )  # fmt: skip
+
+
+def _costs(
+    words: Mapping[str, NDArray[np.uint32]], instructions: Array, steps: int, further: Iterable[str]
+) -> dict[str, Any]:
+    """Return instructions and memory for a `BlockMeasurement`."""
+    means = instructions[steps:].reshape(-1, STRETCH).mean(axis=1).tolist()
+    return {
+        "average": float(instructions[:steps].mean()),
+        "maximum": float(round(instructions.max())),
+        "regimes": dict(zip(further, means, strict=True)),
+    } | {name: int(words[name][0]) for name in ("text", "library", "data", "stack")}
 
 
 def counted(

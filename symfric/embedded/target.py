@@ -34,8 +34,12 @@ Subject = tuple[Path, dict[str, str]]
 
 def own(block: Block, real: str, folder: Path, *, guards: bool) -> Subject:
     """Write the C of symfric for a step of `block` into `folder`."""
-    c = CBlock(block, REALS[real], guards)
-    name = c.name
+    return of_c(CBlock(block, REALS[real], guards), folder)
+
+
+def of_c(c: CBlock, folder: Path) -> Subject:
+    """Write the C of a block into `folder`."""
+    name, block, guards = c.name, c.block, c.guards
     write_text(folder / f"{name}.h", header(c))
     write_text(folder / f"{name}.c", source(c))
     pointers = {

@@ -30,6 +30,7 @@ class Real:
         letter: ending of literals and of the functions of math.h.
         size: size in bytes.
         script: True for JavaScript, whose declarations have no type.
+        whole: True for integers.
     """
 
     name: str
@@ -37,10 +38,13 @@ class Real:
     letter: str
     size: int
     script: bool = False
+    whole: bool = False
 
     @property
     def kind(self) -> Any:
         """The same type in NumPy."""
+        if self.whole:
+            return np.int32
         return np.float32 if self.size == 4 else np.float64
 
     def rounded(self, values: object) -> NDArray[np.float64]:
@@ -54,6 +58,8 @@ class Real:
         Raises:
             ValueError: NaN, or a number that overflows or vanishes in this type.
         """
+        if self.whole:
+            return f"{value:.0f}"
         with np.errstate(over="ignore", under="ignore"):
             rounded = self.kind(value)
         vanishes = bool(rounded == 0.0 and value != 0.0)
@@ -86,6 +92,7 @@ class Real:
 DOUBLE = Real("double", "f64", "", 8)
 FLOAT = Real("float", "f32", "f", 4)
 SCRIPT = Real("double", "js", "", 8, script=True)
+INTEGER = Real("int32_t", "q31", "", 4, whole=True)
 REALS = {real.name: real for real in (DOUBLE, FLOAT)}
 
 
@@ -201,7 +208,7 @@ class Writer:
         logical: for each node, True if it is a bool.
     """
 
-    def __init__(self, source: Graph, logical: Sequence[bool], real: Real) -> None:
+    def __init__(self, source: Graph, logical: list[bool], real: Real) -> None:
         self.source, self.logical, self.real = source, logical, real
         self.names: dict[int, str] = {}
         values = {"zero": 0.0, "one": 1.0, "two": 2.0}

@@ -11,10 +11,11 @@ from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from re import fullmatch
+from typing import Protocol, final
 
 import casadi as ca
 
-from symfric.emitter.c99 import FORMS, FUNCTIONS, Real, Writer, operation_name
+from symfric.emitter.c99 import FORMS, FUNCTIONS, Expression, Real, Writer, operation_name
 from symfric.emitter.logic import LOWERED, logical, settled, simplified
 from symfric.emitter.statements import (
     IfStatement,
@@ -47,6 +48,36 @@ class Code:
     calls: Counter[str]
     operations: int
     outside: int
+
+
+class Formulas(Protocol):
+    """Writer of nodes as formulas, such as `Writer`.
+
+    Attributes:
+        names: names of nodes.
+        logical: for each node, True if it is a bool.
+        real: type of the numbers.
+    """
+
+    names: dict[int, str]
+    logical: list[bool]
+    real: Real
+
+    def expression(self, i: int) -> Expression:
+        """Return the value of a node, a bool or a number."""
+        ...
+
+    def number(self, i: int) -> Expression:
+        """Return the value of a node as a number."""
+        ...
+
+    def negation(self, i: int) -> Expression:
+        """Return the negation of a bool."""
+        ...
+
+    def truth(self, i: int) -> Expression:
+        """Return the value of a node as a bool."""
+        ...
 
 
 def emit(
@@ -88,7 +119,8 @@ def emit(
         raise ValueError(f"codegen: expected operations that C99 has, got {got}")
     better = settled(simplified(source, conditions, truths))
     bools = logical(better.nodes, conditions)
-    body = _Body(better, bools, names, targets, real, loads or {}, stem, truths)
+    write = Writer(better, bools, real)
+    body = StatementWriter(better, names, targets, write, loads or {}, stem, truths)
     lines = tuple(body.region(0))
     places = zip(better.nodes, body.plan.placed.place, strict=True)
     done = [(node.op, place == 0) for node, place in places if node.op not in LEAVES]
@@ -101,29 +133,31 @@ def emit(
     )
 
 
+@final
 @dataclass
-class _Body:
-    """Writer of the statements of a graph, for the arguments of `emit`.
+class StatementWriter:
+    """Writer of the statements of a simplified graph, for the arguments of `emit`.
 
     Attributes:
+        writer: writer of the formulas.
         used: (argument, row) of the inputs that occur.
         waiting: places of the inputs that are still to be loaded, by node.
     """
 
     source: Graph
-    bools: Sequence[bool]
     names: Sequence[Sequence[str]]
     targets: Sequence[Sequence[str]]
-    real: Real
+    writer: Formulas
     loads: Mapping[tuple[int, int], str]
-    stem: str
-    truths: Collection[int]
+    stem: str = "t"
+    truths: Collection[int] = ()
 
     def __post_init__(self) -> None:
-        self.plan = planned(self.source, self.bools, self._stores())
+        self.real = self.writer.real
+        self.plan = planned(self.source, self.writer.logical, self._stores())
         while any(fullmatch(self.stem + r"\d+", name) for row in self.names for name in row):
             self.stem += "_"
-        self.count, self.writer = 0, Writer(self.source, self.bools, self.real)
+        self.count = 0
         taken = sorted({i for values in self.plan.takes.values() for i in values})
         nodes = self.source.nodes
         entries = {i: nodes[i].entry for i in taken if nodes[i].op == ca.OP_INPUT}

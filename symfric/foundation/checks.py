@@ -35,7 +35,7 @@ LONGEST = 60
 """Largest length of a value shown in an error [characters]."""
 LONGEST_LINE = 200
 """Largest length of a name [characters]."""
-LISTED = 16
+LISTED = 32
 """Largest number of known names listed in an error."""
 
 
@@ -376,6 +376,7 @@ def check_names(where: str, given: Iterable[str], known: Collection[str], hint: 
     close = [
         [one for one in known if any({one, name} <= names for names in same)]
         or [one for one in known if one.endswith((f".{name}", f"_{name}"))]
+        or [one for one in known if one.startswith(f"{name}_")]
         or get_close_matches(name, list(known), n=1, cutoff=0.4)
         for name in unknown
     ]

@@ -118,7 +118,7 @@ def save(figure: Figure, path: str | Path | None, dpi: float = 150) -> Figure:
     if path is not None:
         known = sorted(figure.canvas.get_supported_filetypes())
         place = checks.path("picture", path)
-        ending = place.suffix.removeprefix(".").lower()
+        ending = place.suffix.removeprefix(".").lower() or "none"
         checks.check_names(f"picture '{path}': ending", [ending], known)
         with written(place) as temporary:
             figure.savefig(temporary, dpi=dpi)

@@ -67,11 +67,15 @@ def param(
             in (0, `POSITIVE`] admits all positive numbers.
 
     Raises:
-        ValueError: the role is unknown.
+        ValueError: the role is unknown, or a bound or the width is no number.
     """
     if role and role not in ROLES:
         raise ValueError(f"param: role: expected one of {', '.join(ROLES)}, got {role!r}")
     unit = units.checked("param", unit, stacklevel=3)
+    checks.count("param: width", width, least=-9, most=9)
+    for name, bound in (("lower", lower), ("upper", upper)):
+        if checks.as_number(bound) is None:
+            raise checks.refused(f"param: {name}", "a number", bound)
     meta = {"unit": unit, "doc": doc, "role": role, "lower": lower, "upper": upper, "width": width}
     return field(default=default, metadata=meta)
 

@@ -97,5 +97,9 @@ class OverloadWarning(UserWarning):
     """Warning about friction above its static level, for example of bristles that do not relax."""
 
 
+class LimitWarning(UserWarning):
+    """Warning about a state or an input that leaves its bounds."""
+
+
 class EnergyWarning(UserWarning):
     """Warning about friction that adds energy to the motion, as a law with a wrong sign does."""

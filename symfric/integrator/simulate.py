@@ -178,6 +178,7 @@ def simulate(
         UserWarning: rtol above 1e-5, where stick phases may be missed.
         OverloadWarning: friction above its static level, for example from a bristle that does not
             relax. The run is still returned; its `doubts` give the contact and the time.
+        LimitWarning: a state or an input leaves the bounds of its `Variable`.
         EnergyWarning: friction adds energy to the motion, for example a law with the wrong sign.
     """
     check_model("simulate", model)

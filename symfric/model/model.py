@@ -11,6 +11,7 @@ from functools import cached_property, partial
 from typing import Any
 
 import casadi as ca
+import numpy as np
 
 from symfric.foundation import checks, packed
 from symfric.foundation.numeric import Scalar
@@ -18,6 +19,7 @@ from symfric.foundation.parameters import Variable, check_names
 from symfric.foundation.shown import Showing, Shown, TextTable, among, counted, figure_of
 from symfric.foundation.variable import stacked
 from symfric.model.forces import closed, opened, reopened, with_forces
+from symfric.model.kinds import MODE
 from symfric.model.parts import Holonomic, Monitor, Output
 from symfric.model.problems import (
     GROUPS,
@@ -203,6 +205,34 @@ class Model(Showing, System):
         taken = {*found, *self.signals, *(v.name for v in self.p)}
         own = accelerations(self).items()
         return found | {name: output for name, output in own if name not in taken}
+
+    @cached_property
+    def cyclic(self) -> tuple[str, ...]:
+        """Names of the states on which no equation or event depends, such as a counted angle."""
+        used = ca.DM(ca.sum1(ca.jacobian_sparsity(self._rows, self.vector("x")))).full().ravel()
+        pairs = zip(self.x, used, strict=True)
+        return tuple(v.name for v, count in pairs if not count and v.kind != MODE)
+
+    @cached_property
+    def angles(self) -> tuple[str, ...]:
+        """Names of the angles [rad] of which a whole turn changes no equation and no event."""
+        symbols = self._symbols()
+        f = ca.Function("rows", [symbols], [self._rows])
+        points = np.random.default_rng(0).uniform(0.1, 1.0, (symbols.numel(), 3))
+        first, found = f(points).full(), list[str]()
+        for row, v in enumerate(self.x, 1 + self.xdot.numel()):
+            if v.unit == "rad" and v.name not in self.cyclic:
+                turned = points + 2 * np.pi * (np.arange(len(points)) == row)[:, None]
+                if np.abs(f(turned).full() - first).max() <= 1e-9 * np.abs(first).max():
+                    found.append(v.name)
+        return tuple(found)
+
+    @property
+    def _rows(self) -> ca.SX:
+        """Equations, constraints, and expressions of events."""
+        constraints = ca.SX(0, 1) if self.holonomic is None else self.holonomic.phi
+        events = [ca.SX(e) for one in self.events for e in (one.expression, *one.reset.values())]
+        return ca.vertcat(self.residual, constraints, *events)
 
     def expression(self, name: str) -> ca.SX:
         """Return the signal or detail `name` in the symbols of the model.

@@ -16,7 +16,8 @@ from symfric.foundation.parameters import Variable
 from symfric.foundation.units import per_second
 from symfric.foundation.variable import stacked, starts_of, symbols_of
 from symfric.model.contact import Contact, Variables
-from symfric.model.parts import Event, Holonomic, Monitor, Output, Sketch
+from symfric.model.parts import Event, Holonomic, Monitor, Output
+from symfric.model.sketch import Sketch
 
 
 @dataclass(frozen=True, eq=False, repr=False)

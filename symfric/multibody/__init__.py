@@ -51,7 +51,7 @@ if TYPE_CHECKING:
     from symfric.multibody.joints import Universal as Universal
     from symfric.multibody.kinematics import Kinematics as Kinematics
     from symfric.multibody.mechanism import Mechanism as Mechanism
-    from symfric.multibody.mechanism import functions as functions
+    from symfric.multibody.named_functions import functions as functions
     from symfric.multibody.spatial import GROUND as GROUND
     from symfric.multibody.spatial import Body as Body
     from symfric.multibody.spatial import Frame as Frame

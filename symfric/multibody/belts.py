@@ -8,7 +8,7 @@ from typing import final
 import casadi as ca
 
 from symfric.foundation.checks import as_number
-from symfric.foundation.numeric import Scalar, equals
+from symfric.foundation.numeric import Scalar, equals, is_number
 from symfric.laws import Law
 from symfric.multibody.actuated import ActuatedElement, overwound, wrapped
 from symfric.multibody.forces import Axial, Load
@@ -143,6 +143,12 @@ class Belt(_Wound):
     angle: Scalar
     groove: Scalar = pi / 2
     preload: Scalar = 0.0
+
+    def problems(self) -> Iterator[str]:
+        """Yield messages about invalid numbers, and about an angle of more than a turn."""
+        yield from super().problems()
+        if is_number(self.angle) and self.angle > 2 * pi:
+            yield f"angle: expected at most 2 pi rad, got {self.angle:g}; angles are in radians"
 
     def joints(self) -> tuple[tuple[str, str], ...]:
         """Return both pulleys."""

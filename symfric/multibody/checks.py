@@ -77,7 +77,9 @@ def _moving(where: str, pairs: Iterable[tuple[str, str]], joints: Sequence[Joint
             yield f"{where}: expected a joint, got {name}{hint}"
         elif known[name].way(direction) not in known[name].directions:
             expected = " or ".join(known[name].directions) or "a joint that moves along an axis"
-            yield f"{where} > direction: expected {expected}, got {direction or 'none'}"
+            kind = type(known[name]).__name__
+            got = f"got {direction or 'none'}; '{name}' is a {kind} joint"
+            yield f"{where} > direction: expected {expected}, {got}"
 
 
 def _on_one_base(

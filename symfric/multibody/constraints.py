@@ -16,16 +16,18 @@ from typing import Any, ClassVar, NamedTuple, final
 
 import casadi as ca
 
+from symfric.foundation import checks
 from symfric.foundation.checks import expression
 from symfric.foundation.numeric import Scalar
 from symfric.multibody.contact import Contact
 from symfric.multibody.dynamics import numbered, twist_jacobian
-from symfric.multibody.forces import Axial, Load, OnJoint, Part
+from symfric.multibody.forces import Axial, Load, OnJoint, Part, evaluated, reason_of
 from symfric.multibody.joint import Joint
 from symfric.multibody.kinematics import Kinematics, Motion
 from symfric.multibody.spatial import GROUND
 
 Loads = Sequence[Load | Axial]
+COMPARISONS = (ca.OP_EQ, ca.OP_LT, ca.OP_LE, ca.OP_NE)
 
 
 class ConstraintLoads(NamedTuple):
@@ -133,7 +135,7 @@ class PrescribedMotion(OnJoint, Constraint):
         try:
             target = ca.SX(expression("motion", self.motion(kin.t)))
         except (TypeError, ValueError, ArithmeticError, RuntimeError) as error:
-            reason = str(error).rpartition(", got ")[2].partition("\n")[0]
+            reason = reason_of(error).rpartition(", got ")[2]
             return impossible(f"{what}, got {reason}; use casadi functions, not those of math")
         if target.numel() != 1:
             return impossible(f"motion: expected one expression, got {target.numel()}")
@@ -148,7 +150,7 @@ class UserConstraint(Constraint):
     """Constraint that sets expressions of positions and time to zero.
 
     `expression` takes the kinematics, with `point("body.frame")` for a position (and a velocity,
-    which must not be used), `motion["body"]` with R and p, `along(joint, direction)` for a
+    which must not be used), `motion["body"]` with R and p, `along("joint", direction)` for a
     displacement, and the time `t`. It returns one expression or a column of expressions. The
     multipliers are `<name>_lambda`, or `<name>_lambda_1`, `<name>_lambda_2`, ... The bodies are
     loaded with -phi_p' lam at their origins, so that joint reactions and friction are correct.
@@ -165,20 +167,24 @@ class UserConstraint(Constraint):
         for name in (n for n in kin.motion if n != GROUND):
             motion[name] = Motion(ca.SX.sym("R", 3, 3), *(ca.SX.sym(x, 3) for x in "pwvab"))
         probe = replace(kin, motion=motion)
-        given: Any = self.expression(probe)
+        given: Any = evaluated(self, probe)
         try:
             phi = ca.SX(ca.vertcat(*given) if isinstance(given, tuple | list) else given)
         except (NotImplementedError, RuntimeError):
             return impossible(f"expression: expected one or a column of them, got {given!r}")
         if phi.is_empty() or phi.size2() != 1:
             return impossible(f"expression: expected one or a column of them, got {phi.shape}")
-        moving = (m for name, m in probe.motion.items() if name != GROUND)
+        if any(phi[i].op() in COMPARISONS for i in range(phi.numel())):
+            return impossible("expression: expected a difference a - b, got a comparison")
+        moving = [m for name, m in probe.motion.items() if name != GROUND]
         rates = [x for m in moving for x in (m.w_B, m.v_B, m.dw_B, m.dv_B)]
         if ca.depends_on(phi, ca.vertcat(kin.qd, *rates)):
             return impossible(
                 "expression: expected positions only, got velocities; nonholonomic constraints "
                 "are excluded"
             )
+        if not ca.depends_on(phi, ca.veccat(kin.q, *(x for m in moving for x in (m.R, m.p)))):
+            return impossible(f"expression: expected one of positions, got {checks.shown(phi)}")
         rows, bodies = [phi, ca.jacobian(phi, kin.q)], [n for n in probe.motion if n != GROUND]
         symbols, poses = list[ca.SX](), list[ca.SX]()
         for name in bodies:

@@ -33,9 +33,9 @@ class Equations:
     """Equations of motion with accelerations, multipliers and friction forces as symbols.
 
     Attributes:
-        forces: applied forces.
+        forces, constraints: applied forces, and constraints other than joints.
         loads: loads of each of `forces` on the bodies.
-        held: constraints other than joints.
+        held: equations and loads of each of `constraints`.
         turns: angles of joints in loops that forces depend on.
         norms: number of norm constraints of Euler parameters; these are the last constraints.
         q, qd, a: coordinates, rates, accelerations, shape (n, 1).
@@ -52,6 +52,7 @@ class Equations:
 
     kin: Kinematics
     forces: tuple[Force, ...]
+    constraints: tuple[Constraint, ...]
     loads: tuple[tuple[Load | Axial, ...], ...]
     loops: tuple[LoopConstraints, ...]
     held: tuple[ConstraintLoads, ...]
@@ -196,9 +197,9 @@ def equations(
     phi_ddot = ca.jtimes(phi, q, a) + ca.jtimes(phi_dot, q, qd) + ca.jacobian(phi_dot, t)
     normals = tuple(c.normal(kin, pressing) for c in contacts)
     return Equations(
-        kin, tuple(forces), applied, loops, held, tuple(turns.values()), norms.numel(), q, qd, a,
-        lam, stacked(c.F for c in contacts), ca.densify(phi), phi_dot, phi_ddot, ca.densify(rows),
-        contacts, normals, reactions, pressing,
+        kin, tuple(forces), tuple(constraints), applied, loops, held, tuple(turns.values()),
+        norms.numel(), q, qd, a, lam, stacked(c.F for c in contacts), ca.densify(phi), phi_dot,
+        phi_ddot, ca.densify(rows), contacts, normals, reactions, pressing,
     )  # fmt: skip
 
 

@@ -110,10 +110,36 @@ class Part(Keywords, ABC):
             good = isinstance(value, ca.SX) and is_symbolic(value)
             good = good or (is_number(value) and abs(value) < ca.inf)
             if item.type is Scalar and not good:
-                yield f"{item.name}: expected a finite number, got {value!r}"
+                yield f"{item.name}: expected a finite number, got {checks.shown(value)}"
             if of is not None and not callable(value):
                 expected = f"expected a function of {of[0]}"
                 yield f"{item.name}: {expected}, got {value!r}; write lambda {of[1]}: ..."
+
+
+def evaluated(part: Any, kin: Kinematics) -> Any:
+    """Return `part.expression(kin)`.
+
+    Raises:
+        ValueError: the expression uses a name that the mechanism does not have, or Python cannot
+            evaluate it.
+    """
+    where = f"{part.kind} '{part.name}' > expression"
+    try:
+        return part.expression(kin)
+    except KeyError as error:
+        raise checks.refused(where, "names of bodies or joints", error.args[0]) from error
+    except ValueError as error:
+        raise ValueError(f"{where} > {error}") from error
+    except (AttributeError, RuntimeError, TypeError) as error:
+        what = "expected a function of the kinematics"
+        raise ValueError(f"{where}: {what}, got {reason_of(error)}") from error
+
+
+def reason_of(error: Exception) -> str:
+    """Return why a function of the user cannot be evaluated for symbols."""
+    if "truth value" in str(error):
+        return "a condition that Python evaluates (if, and, or); write casadi.if_else"
+    return f"{error}".partition("\n")[0]
 
 
 class OnJoint(Part):
@@ -191,6 +217,12 @@ class SpringDamper(Force):
     free_length: Scalar = 0.0
     damping: Scalar = 0.0
     actuator: Scalar = 0.0
+
+    def problems(self) -> Iterator[str]:
+        """Yield messages about invalid numbers, and about one place given twice."""
+        yield from super().problems()
+        if self.a == self.b:
+            yield f"expected two places, got {self.a} twice"
 
     def loads(self, kin: Kinematics) -> Iterator[Load | Axial]:
         """Yield opposite forces on the line between the points."""
@@ -330,7 +362,7 @@ class UserForce(Force):
     """Force [N] and moment [N m] at a place as expressions of the motion of any bodies.
 
     `expression` takes the kinematics, with `point("body.frame")` for position and velocity,
-    `motion["body"]` with R, p, w, v, and `along(joint, direction)` for a displacement or an angle
+    `motion["body"]` with R, p, w, v, and `along("joint", direction)` for a displacement or an angle
     that counts full turns, and its rate. It returns force and moment in world components.
     """
 
@@ -346,7 +378,7 @@ class UserForce(Force):
 
     def loads(self, kin: Kinematics) -> Iterator[Load | Axial]:
         """Yield force and moment of the user's expression."""
-        given: Any = self.expression(kin)
+        given: Any = evaluated(self, kin)
         pair: Sequence[Any] = given if isinstance(given, tuple | list) else ()
         if len(pair) != 2 or not all(map(is_vector, pair)):
             what = "a force and a moment, three numbers or expressions each"

@@ -41,7 +41,7 @@ from symfric.foundation.variable import take_si
 from symfric.laws import Law
 from symfric.laws.base.law import FORCE, require_law
 from symfric.laws.composed.isotropic import anisotropy
-from symfric.model.parts import Symbol
+from symfric.model.sketch import Symbol
 
 OFFERED = (FORCE,)
 """Inputs in addition to v and N that a joint other than a ball provides for a law."""

@@ -7,7 +7,7 @@ from typing import ClassVar, final
 import casadi as ca
 
 from symfric.foundation.numeric import Scalar, is_number, is_symbolic
-from symfric.model.parts import Symbol
+from symfric.model.sketch import Symbol
 from symfric.multibody.joint import FORCE_NAMES, Joint, JointFriction, Pair, unit
 from symfric.multibody.spatial import euler_g, rotation, rotation_x, rotation_y, rotation_z
 

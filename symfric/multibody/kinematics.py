@@ -7,6 +7,7 @@ from typing import NamedTuple, final
 import casadi as ca
 import numpy as np
 
+from symfric.foundation.checks import check_names
 from symfric.foundation.numeric import nonzeros
 from symfric.foundation.parameters import Variable
 from symfric.foundation.variable import stacked
@@ -210,12 +211,18 @@ class Kinematics:
         q, qd = self.q[link.rows, 0], self.qd[link.rows, 0]
         return joint.pose(q)[0] @ (joint.subspace(q)[0] @ qd)
 
-    def along(self, joint: Joint, direction: str) -> tuple[ca.SX, ca.SX]:
+    def along(self, joint: Joint | str, direction: str = "") -> tuple[ca.SX, ca.SX]:
         """Return the displacement or angle of a joint in one of its `directions`, and its rate.
 
-        The angle of a joint that closes a loop counts full turns in forces; in constraints it is
-        between -pi and pi.
+        `joint` may be a name, and the only direction, or else "turn", may be omitted. The angle of
+        a joint that closes a loop counts full turns in forces; in constraints it is between -pi and
+        pi.
         """
+        if isinstance(joint, str):
+            check_names("kinematics: along: joint", [joint], self.topology.joints)
+            joint = self.topology.joints[joint]
+            direction = joint.way(direction)
+            check_names(f"kinematics: along: {joint.name}", [direction], joint.directions)
         link, rate = self.topology.link_of.get(joint.name), self.rate(joint, direction)
         if link is not None:
             return self.q[link.first + joint.directions[direction]], rate

@@ -1,6 +1,6 @@
 """Builder of mechanisms and their models, and their equations as named CasADi Functions."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 from pathlib import Path
@@ -10,17 +10,16 @@ import casadi as ca
 
 from symfric.foundation import packed
 from symfric.foundation.checks import kind, many, number, shown
-from symfric.foundation.numeric import Scalar, equals
+from symfric.foundation.numeric import Array, Scalar, equals
 from symfric.foundation.parameters import Variable, check_names
 from symfric.foundation.shown import Showing, Shown, TextTable, among, counted, figure_of
 from symfric.foundation.symbolic import plain, with_symbols
-from symfric.foundation.variable import stacked, starts_of, symbols_of
+from symfric.foundation.variable import symbols_of
 from symfric.model import Model, Variables
 from symfric.multibody import checks
 from symfric.multibody.actuated import ActuatedElement
 from symfric.multibody.assembly import assemble
 from symfric.multibody.constraints import Constraint
-from symfric.multibody.contact import places_of
 from symfric.multibody.element_friction import ElementFriction
 from symfric.multibody.forces import Force, Gravity, SpringDamper
 from symfric.multibody.joint import Joint
@@ -31,7 +30,6 @@ from symfric.multibody.prepare import (
     project,
     written,
 )
-from symfric.multibody.slips import slips
 from symfric.multibody.spatial import GROUND, Body, Frame, Vector, is_vector
 from symfric.multibody.topology import Topology, spanning_tree
 
@@ -65,6 +63,7 @@ class Mechanism(packed.Portable, Showing):
         self.forces: list[Force] = []
         self.constraints: list[Constraint] = []
         self.inputs: list[Variable] = []
+        self.limits: dict[str, tuple[float, float]] = {}
         self.frames: list[tuple[str, Frame]] = []
         self._wrong: list[str] = []
         gravity = plain(gravity)
@@ -104,9 +103,9 @@ class Mechanism(packed.Portable, Showing):
     def schematic(self, path: str | Path | None = None, p: Variables = ()) -> "Figure":
         """Return a labelled figure of the mechanism at its start, 85 mm wide.
 
-        It has bodies, joints, springs and dampers with their names and parameters, coordinates
-        (blue) and inputs (green) with their positive directions, and contacts with friction with
-        their loads (orange).
+        It has bodies, joints, forces other than gravity, and constraints with their names or
+        parameters, coordinates (blue) and inputs (green) with their positive directions, and
+        contacts with friction with their loads (orange).
 
         Args:
             path: output file; its suffix (.png, .svg, .pdf) selects the format.
@@ -140,13 +139,14 @@ class Mechanism(packed.Portable, Showing):
         at: Vector = (0.0, 0.0, 0.0),
         z: Sequence[float] = (0.0, 0.0, 1.0),
         x: Sequence[float] | None = None,
+        outline: Array | None = None,
     ) -> None:
         """Add the frame "body.frame"; see `Frame`."""
         if not isinstance(place, str):  # pyright: ignore[reportUnnecessaryIsInstance]
             self._wrong.append(f"frame: expected 'body.frame' of a known body, got {shown(place)}")
             return
         try:
-            self.frames.append((place, Frame(plain(at), plain(z), plain(x))))
+            self.frames.append((place, Frame(plain(at), plain(z), plain(x), outline)))
         except ValueError as error:
             self.frames.append((place, Frame()))
             self._wrong.append(
@@ -169,7 +169,9 @@ class Mechanism(packed.Portable, Showing):
         what = wanted.__name__
         if not isinstance(part, wanted):
             message = f"expected a {what} of symfric.multibody, got {shown(part)}"
-            self._wrong.append(f"{what.lower()}: {message}")
+            kinds = [k.__name__.lower() for k in (Joint, Force, Constraint) if isinstance(part, k)]
+            hint = "".join(f"; add it by {kind}(...)" for kind in kinds)
+            self._wrong.append(f"{what.lower()}: {message}{hint}")
         elif odd := list(checks.texts(part)):
             self._wrong += [f"{what.lower()} {shown(getattr(part, 'name', ''))} > {t}" for t in odd]
         else:
@@ -181,6 +183,14 @@ class Mechanism(packed.Portable, Showing):
         variable = Variable(name, unit, start=start, nominal=nominal)
         self.inputs.append(variable)
         return variable.symbol
+
+    def limit(self, name: str, lower: float, upper: float) -> None:
+        """Set the bounds of a joint coordinate, its rate `<coordinate>_rate`, or an input.
+
+        Optimal control keeps them, `simulate` ends with a `LimitWarning` if they are exceeded, and
+        generated C clips its inputs to them.
+        """
+        self.limits[name] = lower, upper
 
     def build(
         self, p: Variables = (), formulation: str = "joint", index: int | None = None
@@ -217,6 +227,7 @@ class Mechanism(packed.Portable, Showing):
         for variable in p:
             kind(where, variable, Variable, "variables made by Variable(...)")
         made = written(self._tree(p), self.forces, self.constraints, p, tuple(self.inputs))
+        made = _limited(f"mechanism '{self.name}' > limit", made, self.limits)
         loose = checks.undeclared_in_forces(made)
         self._refuse([*made.problems, *made.misfits, *checks.left_open(made), *loose])
         self._refuse(checks.infinite(made))
@@ -314,83 +325,15 @@ class Mechanism(packed.Portable, Showing):
         return placed
 
 
-def functions(
-    mechanism: Mechanism, p: Variables = (), formulation: str = "joint"
-) -> dict[str, ca.Function]:
-    """Return Functions of coordinates q, rates qd, accelerations a, inputs u and parameters p.
-
-    Functions that depend on time, through prescribed motion or forces, have a last argument t.
-
-    Args:
-        mechanism: the mechanism.
-        p: parameters, as for `Mechanism.build`.
-        formulation: "joint" or "absolute".
-
-    Returns:
-        mass: (q, p) -> M, shape (n, n).
-        bias: (q, qd, u, p) -> Coriolis forces minus applied forces, without friction: the negative
-            of M a + phi_q' lam.
-        constraints: (q, p) -> phi, shape (m, 1), and its Jacobian phi_q.
-        inverse_dynamics: (q, qd, a, lam, z, u, p) -> the additional generalised forces required for
-            the accelerations a, including friction, whose normal forces are explicit in a and lam.
-            z are the internal states of the laws.
-        energy: (q, qd, p) -> kinetic and potential energy [J].
-        poses: (q, p) -> [R_WB, p_WB] of every body, concatenated to shape (3, 4 bodies).
-
-    Raises:
-        ValueError: as `Mechanism.build`.
-
-    Limits: q does not contain the number of full turns of a joint that closes a loop; springs about
-    the axis of such a joint are evaluated at the equivalent angle that is nearest to the start.
-    """
-    eq = mechanism.prepare(p, formulation).eq
-    where = f"mechanism '{mechanism.name}'"
-    if applied := [c for c in eq.contacts if c.law.inputs]:
-        law = type(applied[0].friction.law).__name__
-        raise ValueError(
-            f"{where} > {applied[0].law_place}: expected one that needs only v and N, got {law}, "
-            "whose force in stick depends on the motion; use `build`"
-        )
-    contacts = slips(eq, [1.0] * len(eq.contacts))
-    forces = stacked(c.force for c in contacts)
-    for c in contacts:
-        if c.N is not c.normal:
-            normal = c.contact.explicit_normal(c.normal, c.force, c.N)
-            forces = ca.substitute(forces, c.N, normal)
-    if ca.depends_on(forces, eq.F):
-        names = places_of(c.contact for c in contacts if ca.depends_on(c.normal, eq.F))
-        raise ValueError(
-            f"{where} > {names} > friction: expected a normal force that does not depend on "
-            "friction; use `build` for a model, or a constant normal force"
-        )
-    still = [ca.SX.zeros(x.numel()) for x in (eq.a, eq.lam, eq.F)]
-    (bias,) = ca.substitute([eq.balance], [eq.a, eq.lam, eq.F], still)
-    bodies = [m for name, m in eq.kin.motion.items() if name != GROUND]
-    poses = ca.horzcat(ca.SX(3, 0), *(ca.horzcat(m.R, m.p) for m in bodies))
-    u, parameters = (symbols_of(group) for group in (mechanism.inputs, p))
-    every = {
-        "q": eq.q, "qd": eq.qd, "a": eq.a, "lam": eq.lam,
-        "z": symbols_of(v for c in contacts for v in c.states), "u": u, "p": parameters,
-        "t": eq.kin.t,
-    }  # fmt: skip
-    turned = ca.densify(starts_of(turn.angle for turn in eq.turns))
-
-    def function(name: str, arguments: str, **results: ca.SX) -> ca.Function:
-        expressions = [ca.densify(result) for result in results.values()]
-        expressions = ca.substitute(expressions, [eq.angles], [turned])
-        named = arguments.split()
-        if ca.depends_on(ca.veccat(*expressions), eq.kin.t):
-            named.append("t")
-        symbols = [every[argument] for argument in named]
-        return ca.Function(name, symbols, expressions, named, list(results), {"cse": True})
-
-    moved = ca.substitute(eq.balance, eq.F, forces)
-    made = (
-        function("mass", "q p", M=eq.mass),
-        function("bias", "q qd u p", bias=bias),
-        function("constraints", "q p", phi=eq.phi, phi_q=eq.Phi_q),
-        function("inverse_dynamics", "q qd a lam z u p", missing=moved),
-        function("energy", "q qd p", kinetic=eq.kinetic, potential=eq.potential),
-        function("poses", "q p", poses=poses),
-    )
-    return {each.name(): each for each in made}
+def _limited(
+    where: str, made: PreparedMechanism, limits: Mapping[str, tuple[float, float]]
+) -> PreparedMechanism:
+    """Return the equations with bounds of coordinates, rates and inputs, by name."""
+    groups = {name: getattr(made, name) for name in ("q", "qd", "u")}
+    check_names(where, limits, [v.name for group in groups.values() for v in group])
+    ends = {name: dict(zip(("lower", "upper"), pair, strict=True)) for name, pair in limits.items()}
+    changed = {
+        name: tuple(replace(v, **ends[v.name]) if v.name in ends else v for v in group)
+        for name, group in groups.items()
+    }
+    return replace(made, **changed) if limits else made

@@ -9,10 +9,10 @@ from symfric.foundation.numeric import Scalar, equals, is_number
 from symfric.foundation.variable import stacked, strays
 from symfric.model import Output
 from symfric.model.kinds import WORK
-from symfric.model.parts import Arrow, Mark, Part, Sketch, Symbol
+from symfric.model.sketch import Arrow, Mark, Part, Sketch, Symbol
 from symfric.multibody.contact import LeverContact
 from symfric.multibody.equations import Equations
-from symfric.multibody.forces import JointSpringDamper, SpringDamper
+from symfric.multibody.forces import Gravity, JointSpringDamper, SpringDamper
 from symfric.multibody.joint import COMPONENTS, FORCE_NAMES
 from symfric.multibody.joints import Distance, Universal
 from symfric.multibody.kinematics import Motion
@@ -155,7 +155,7 @@ def sketch(eq: Equations, scales: Mapping[str, float]) -> Sketch:
     bodies, joints = kin.topology.bodies, kin.topology.joints.values()
     springs = [f for f in eq.forces if isinstance(f, SpringDamper)]
     ends = [place for joint in joints for place in (joint.parent, joint.child)]
-    pulled = [place for force in springs for place in force.places()]
+    pulled = [place for force in eq.forces for place in force.places()]
     named = (f"{body}.{frame}" for body, b in bodies.items() for frame in b.frames if frame)
     used = {place: k for k, place in enumerate(dict.fromkeys((*ends, *named, *pulled)))}
     columns = [_column(kin.motion[body_of(p)], kin.frame(p).R, kin.frame(p).p) for p in used]
@@ -165,7 +165,9 @@ def sketch(eq: Equations, scales: Mapping[str, float]) -> Sketch:
         corners = tuple(k for place, k in own if place in ends or place not in pulled)
         far = tuple(k for place, k in own if place not in ends and place in pulled)
         mass = _amount(bodies[name].mass, "kg")
-        parts.append(Part(name, len(columns), corners, far, name == GROUND, mass))
+        drawn = ((k, kin.frame(place).outline) for place, k in own)
+        outlines = tuple((k, lines) for k, lines in drawn if lines is not None)
+        parts.append(Part(name, len(columns), corners, far, name == GROUND, mass, outlines))
         columns.append(_column(motion, ca.SX.eye(3), bodies[name].c))
     marks: list[Mark] = []
     for joint in joints:
@@ -178,27 +180,37 @@ def sketch(eq: Equations, scales: Mapping[str, float]) -> Sketch:
         mark = _mark(force.name, _springy(force), (force.a, force.b), used)
         label = _amounts(force, "N/m", "N s/m") or force.name
         marks.append(replace(mark, label=label))
-    marks += _on_joints(eq, used)
+    marks += _elements_drawn(eq, used, parts[0].centre)
     return Sketch(ca.horzcat(*columns), tuple(parts), tuple(marks), arrows=tuple(_arrows(eq, used)))
 
 
-def _on_joints(eq: Equations, used: Mapping[str, int]) -> Iterator[Mark]:
-    """Yield springs and dampers of joints, and elements with friction such as belts and gears."""
+def _elements_drawn(eq: Equations, used: Mapping[str, int], ground: int) -> Iterator[Mark]:
+    """Yield all forces and constraints but gravity, and springs between places.
+
+    Inputs that act on joints have arrows. An element without joints and places is named at the
+    place `ground`.
+    """
     for force in eq.forces:
         if isinstance(force, JointSpringDamper):
             joint, direction = force.place(eq.kin)
             slides = joint.linear(direction)
             units = ("N/m", "N s/m") if slides else ("N m/rad", "N m s/rad")
-            if label := _amounts(force, *units):
+            driven = ca.SX(force.actuator).is_symbolic()
+            if label := _amounts(force, *units) or ("" if driven else force.name):
                 turned = Symbol() if equals(force.stiffness, 0.0) else SPIRAL
                 ends = joint.parent, joint.child
                 mark = _mark(force.name, _springy(force) if slides else turned, ends, used)
                 yield replace(mark, label=label)
-    for contact in eq.contacts:
-        if isinstance(contact, LeverContact):
-            at = [used[end.joint.child] for end in contact.ends]
+    joints = eq.kin.topology.joints
+    rubbing = {c.part: (c.name,) for c in eq.contacts if isinstance(c, LeverContact)}
+    for part in (*eq.constraints, *eq.forces):
+        if not isinstance(part, Gravity | SpringDamper | JointSpringDamper):
+            at = [used[joints[name].child] for name, _ in part.joints()]
+            at = at + [used[place] for place in part.places()] or [ground]
+            rubs = rubbing.get(part.name, ())
             symbol = LINK if at[0] != at[-1] else Symbol()
-            yield Mark(contact.part, symbol, at[0], at[-1], contacts=(contact.name,))
+            label = "" if rubs else part.name
+            yield Mark(part.name, symbol, at[0], at[-1], contacts=rubs, label=label)
 
 
 def _springy(force: SpringDamper | JointSpringDamper) -> Symbol:

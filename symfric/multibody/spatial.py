@@ -17,6 +17,7 @@ from typing import Any, final
 import casadi as ca
 import numpy as np
 
+from symfric.foundation import checks
 from symfric.foundation.checks import shown
 from symfric.foundation.numeric import Array, Scalar, is_number, is_symbolic
 from symfric.foundation.variable import Variable, at_start, stacked
@@ -111,15 +112,20 @@ class Frame:
         at: position of the origin relative to that of the body [m], in the body's components.
         z, x: directions of the axes. z is the axis of a joint, x is made orthogonal to z, and y is
             z x x. If x is None, an arbitrary direction orthogonal to z is used.
+        outline: lines [m] in the axes of the frame that figures and films draw instead of lines
+            between the frames, shape (n, 3); NaN separates lines, see `symfric.multibody.outlines`.
     """
 
     at: Vector = (0.0, 0.0, 0.0)
     z: Sequence[float] = (0.0, 0.0, 1.0)
     x: Sequence[float] | None = None
+    outline: Array | None = None
     R: ca.SX = field(init=False)
     p: ca.SX = field(init=False)
 
     def __post_init__(self) -> None:
+        if self.outline is not None and np.shape(self.outline)[1:] != (3,):
+            raise checks.refused("frame: outline", "points of shape (n, 3)", self.outline)
         if not is_vector(self.at):
             raise ValueError(f"frame: at: expected three numbers [m], got {self.at}")
         z = _unit("z", self.z)

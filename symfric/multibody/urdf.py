@@ -58,6 +58,10 @@ def read_urdf(
     are read like attributes. If damping or friction is missing, mu_viscous or mu_coulomb of
     Franka's files has the same meaning.
 
+    `<limit>` sets bounds of positions, rates and inputs, see `Mechanism.limit`; `limits.clear()` of
+    the mechanism removes them. Boxes, cylinders and spheres in `<visual>` are drawn in films and
+    schematics, links without them as lines.
+
     Args:
         source: path of the file, or its content.
         law: law that replaces Coulomb; its normal force is f, so with mu_d = 1 it slides at the
@@ -66,7 +70,7 @@ def read_urdf(
         level: f of the joints whose tag does not define it [N m, N].
         bearings: friction by joint name; it replaces the friction of the file.
         stop_stiffness: stiffness of a `JointStop`, named stop_<joint>, at the limits of each joint
-            with lower < upper [N m/rad, N/m]; 0 for no stops.
+            with lower < upper [N m/rad, N/m], instead of bounds of its position; 0 for no stops.
         stop_dissipation: dissipation of these stops [s/rad, s/m].
         floating: True if the root link moves freely (joint `floating_base`); otherwise it is the
             ground, regardless of its mass. A massless root is always the ground.
@@ -81,11 +85,9 @@ def read_urdf(
 
     Warns:
         UserWarning: once, about implausible values that are accepted (see `strict`), about all
-            omitted parts other than visual, collision and material, and about names that are
-            changed because they are not C identifiers. The omitted parts include `<limit>`: effort
-            and velocity are not limited, and joints stop at their limits only with
-            `stop_stiffness`. A separate warning names a law that has no effect, because no joint
-            has friction.
+            omitted parts other than collision and material, such as meshes, and about names that
+            are changed because they are not C identifiers. A separate warning names a law that has
+            no effect, because no joint has friction.
 
     Limits: an unphysical inertia can increase the energy of the motion; `build` rejects it if the
     mass matrix at the start is not positive definite.
@@ -118,7 +120,7 @@ def read_urdf(
     for what, own in (("bearings", bearings), ("laws", laws)):
         check_names(f"urdf '{urdf.name}' {what}", own, [j.name for j in moved])
     m = Mechanism(_identifier(urdf.name), gravity)
-    _add_bodies(m, places, weights, names)
+    _add_bodies(m, places, weights, names, urdf.outlines)
     if not grounded:
         m.joint(Floating(FLOATING, GROUND, names.links[urdf.root]))
     left = list(urdf.left_out)
@@ -127,9 +129,10 @@ def read_urdf(
         friction = bearings.get(joint.name) or tag_friction(joint, own, level)
         left += _hang(m, joint, names, places, friction, urdf.zero(joint))
     _couple(m, moved, names)
-    if not equals(stop_stiffness, 0.0):
+    stops = not equals(stop_stiffness, 0.0)
+    _limit(m, moved, names, stops)
+    if stops:
         _add_stops(m, moved, names, stop_stiffness, stop_dissipation)
-        left = [text.replace("<limit>", "<limit effort, velocity>") for text in left]
     if law is not None and equals(level, 0.0) and not any(joint.friction for joint in moved):
         warnings.warn(
             f"urdf '{urdf.name}': {type(law).__name__} has no effect, because no joint has "
@@ -287,8 +290,9 @@ def _names(urdf: Urdf, grounded: bool) -> _Names:
 
 
 def _add_bodies(
-    m: Mechanism, places: Mapping[str, Carried], weights: Mapping[str, Inertial], names: _Names
-) -> None:
+    m: Mechanism, places: Mapping[str, Carried], weights: Mapping[str, Inertial], names: _Names,
+    outlines: Mapping[str, Array],
+) -> None:  # fmt: skip
     """Add the bodies, and every link as a frame of its body."""
     for link, weight in weights.items():
         if names.links[link] != GROUND:
@@ -297,7 +301,8 @@ def _add_bodies(
             m.body(names.links[link], weight.mass, six.tolist(), weight.com.tolist(), ideal)
     for link, at in places.items():
         name = names.links[link] if names.links[link] != GROUND else _identifier(link)
-        m.frame(f"{names.links[at.body]}.{name}", at.p.tolist(), *at.R.T[[2, 0]].tolist())
+        (z, x), outline = at.R.T[[2, 0]].tolist(), outlines[link] if len(outlines[link]) else None
+        m.frame(f"{names.links[at.body]}.{name}", at.p.tolist(), z, x, outline)
 
 
 def _hang(
@@ -330,12 +335,23 @@ def _hang(
 def _add_stops(
     m: Mechanism, moved: Iterable[UrdfJoint], names: _Names, k: Scalar, e: Scalar
 ) -> None:
-    """Add stops of stiffness k and dissipation e; limits that are missing in the file are zero."""
+    """Add stops of stiffness k and dissipation e."""
     for joint in moved:
-        lower, upper = (joint.limits.get(end, 0.0) for end in ("lower", "upper"))
-        if joint.kind in ("revolute", "prismatic") and lower < upper:
-            name = names.joints[joint.name]
-            m.force(JointStop(f"stop_{name}", name, lower, upper, k, e))
+        if "lower" in joint.limits:
+            name, ends = names.joints[joint.name], (joint.limits["lower"], joint.limits["upper"])
+            m.force(JointStop(f"stop_{name}", name, *ends, k, e))
+
+
+def _limit(m: Mechanism, moved: Iterable[UrdfJoint], names: _Names, stops: bool) -> None:
+    """Set the bounds of inputs, rates and, without stops, positions."""
+    for joint in moved:
+        name, limits = names.joints[joint.name], joint.limits
+        if "lower" in limits and not stops:
+            m.limit(name, limits["lower"], limits["upper"])
+        if "velocity" in limits:
+            m.limit(f"{name}_rate", -limits["velocity"], limits["velocity"])
+        if "effort" in limits and joint.mimic is None:
+            m.limit(f"tau_{name}", -limits["effort"], limits["effort"])
 
 
 def _couple(m: Mechanism, moved: Iterable[UrdfJoint], names: _Names) -> None:

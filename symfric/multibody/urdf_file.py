@@ -4,7 +4,6 @@ import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from math import cos, isfinite, sin
 from pathlib import Path
 from typing import NamedTuple, final
 from xml.parsers import expat
@@ -14,19 +13,20 @@ import numpy as np
 from symfric.foundation import checks
 from symfric.foundation.numeric import Array
 from symfric.multibody.spatial import unphysical
+from symfric.multibody.urdf_text import Notes, outline, tags
 
 KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 SINGLE = KINDS[:3]
 """Kinds of joints with one coordinate."""
 LIMITS = ("lower", "upper", "effort", "velocity")
-DYNAMICS = (("damping", "mu_viscous"), ("friction", "mu_coulomb"))
-"""Names in <dynamics> of damping and friction: of the specification, and of Franka's files."""
+DYNAMICS = (("damping", "mu_viscous"), ("friction", "mu_coulomb", "frictionloss"))
+"""Names in <dynamics> of damping and friction: of the specification, of Franka and of MuJoCo."""
+UNLIMITED = 1e9
+"""Magnitude from which limits are none; Gazebo writes 1e16."""
+BLANK = "\ufeff \t\r\n"
+"""Characters around the content of a file; the first one is the mark of its byte order."""
 POINT = 1e-15
 """Inertia per mass [m^2] below which an inertia is zero: a radius of gyration of 30 nm."""
-APPEARANCE = {"visual", "collision", "material"}
-"""Tags that are ignored without a note."""
-SNAP = 1e-15
-"""Magnitude below which entries of rotation matrices are set to zero, as after a quarter turn."""
 
 
 class Inertial(NamedTuple):
@@ -57,7 +57,7 @@ class UrdfJoint:
         axis: unit vector in the axes of the child link.
         damping: viscous damping [N s/m] or [N m s/rad].
         friction: friction level [N] or [N m].
-        limits: lower and upper [m, rad], effort [N, N m], velocity [m/s, rad/s], where given.
+        limits: lower < upper [m, rad], effort [N, N m], velocity [m/s, rad/s], where given.
         mimic: coupling to another joint, or None.
     """
 
@@ -85,6 +85,7 @@ class Urdf:
         joints: joints; every link except the root is the child of one joint.
         left_out: omitted tags, each with its places.
         doubts: accepted implausible values, each with its path.
+        outlines: outline of the solids in <visual> of each link [m], see `outlines`.
     """
 
     name: str
@@ -92,6 +93,7 @@ class Urdf:
     joints: tuple[UrdfJoint, ...]
     left_out: tuple[str, ...]
     doubts: tuple[str, ...] = ()
+    outlines: Mapping[str, Array] = field(default_factory=dict[str, Array])
 
     @property
     def root(self) -> str:
@@ -118,76 +120,6 @@ class Urdf:
                 yield joint
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Notes:
-    """Notes on a file: problems, doubts (implausible values), and places of omitted tags.
-
-    If `strict`, doubts are problems.
-    """
-
-    strict: bool = False
-    problems: list[str] = field(default_factory=list[str])
-    doubts: list[str] = field(default_factory=list[str])
-    left_out: dict[str, list[str]] = field(default_factory=dict[str, list[str]])
-
-    def others(self, where: str, tag: ET.Element, known: Iterable[str]) -> None:
-        """Note the tags inside `tag` that are not known."""
-        for other in tag:
-            if other.tag.startswith("xacro:"):
-                self.problems.append("<xacro>: expected plain URDF; expand the file with xacro")
-            elif other.tag not in {*known, *APPEARANCE}:
-                self.left(other.tag, where)
-
-    def doubt(self, text: str) -> None:
-        """Note an implausible value that other tools accept."""
-        (self.problems if self.strict else self.doubts).append(text)
-
-    def left(self, tag: str, where: str) -> None:
-        """Note an omitted tag, once for every place."""
-        places = self.left_out.setdefault(tag, [])
-        if where not in places:
-            places.append(where)
-
-    def numbers(self, where: str, tag: ET.Element | None, key: str, default: str) -> Array:
-        """Return the numbers in an attribute, or in `default` if the attribute is missing.
-
-        The attribute must contain as many numbers as `default`.
-        """
-        text = default if tag is None else tag.get(key, default)
-        n = len(default.split())
-        try:
-            found = [float(word) for word in text.split()]
-        except ValueError:
-            found = []
-        if len(found) != n or not all(isfinite(x) for x in found):
-            several = "a number" if n == 1 else f"{n} numbers"
-            self.problems.append(f"{where}: expected {several} in {key}, got '{text}'")
-            found = [float(word) for word in default.split()]
-        return np.array(found)
-
-    def number(self, where: str, tag: ET.Element | None, key: str, default: str = "0") -> float:
-        """Return the number in an attribute."""
-        return float(self.numbers(where, tag, key, default)[0])
-
-    def pose(self, where: str, tag: ET.Element) -> tuple[Array, Array]:
-        """Return the rotation and position in the tag <origin> of `tag`."""
-        origin, at = tag.find("origin"), f"{where} > origin"
-        turn = rotation(*self.numbers(at, origin, "rpy", "0 0 0"))
-        return turn, self.numbers(at, origin, "xyz", "0 0 0")
-
-
-def rotation(roll: float, pitch: float, yaw: float) -> Array:
-    """Return R_z(yaw) R_y(pitch) R_x(roll): rotations about the fixed axes x, y, z in turn."""
-    (cr, sr), (cp, sp), (cy, sy) = ((cos(a), sin(a)) for a in (roll, pitch, yaw))
-    R = np.array([
-        [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-        [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-        [-sp, cp * sr, cp * cr],
-    ])  # fmt: skip
-    return np.where(np.abs(R) < SNAP, 0.0, R)
-
-
 def parse(source: str | Path, strict: bool = False) -> Urdf:
     """Read a URDF file.
 
@@ -202,11 +134,11 @@ def parse(source: str | Path, strict: bool = False) -> Urdf:
             all problems at once, each with its path ("urdf 'arm' > joint 'elbow' > axis").
         OSError: the file cannot be read.
     """
-    is_text = isinstance(source, str) and source.lstrip().startswith("<")
+    is_text = isinstance(source, str) and source.lstrip(BLANK).startswith("<")
     where = "urdf" if is_text else f"urdf '{checks.path('urdf', source)}'"
     if not is_text and not Path(source).is_file():
         raise ValueError(f"{where}: expected a file, got nothing there; check the path")
-    content = str(source).strip().encode() if is_text else Path(source).read_bytes()
+    content = str(source).strip(BLANK).encode() if is_text else Path(source).read_bytes()
     try:
         robot = tags(content, "utf-8" if is_text else None)
     except expat.ExpatError as error:
@@ -216,6 +148,10 @@ def parse(source: str | Path, strict: bool = False) -> Urdf:
     name = robot.get("name") or ("robot" if is_text else Path(source).stem)
     notes = Notes(strict)
     links = {tag.get("name", ""): _inertial(tag, notes) for tag in robot.findall("link")}
+    looks = Notes(left_out=notes.left_out)
+    outlines = {tag.get("name", ""): outline(tag, looks) for tag in robot.findall("link")}
+    for text in (*looks.problems, *looks.doubts):
+        notes.doubt(text)
     joints = tuple(_joint(tag, notes) for tag in robot.findall("joint"))
     notes.others("", robot, {"link", "joint"})
     _check_names(robot, notes)
@@ -228,18 +164,7 @@ def parse(source: str | Path, strict: bool = False) -> Urdf:
         f"<{tag}>" + (f" of {', '.join(at)}" if any(at) else "")
         for tag, at in notes.left_out.items()
     )
-    return Urdf(name, links, joints, left, tuple(notes.doubts))
-
-
-def tags(content: bytes, encoding: str | None, *, comments: bool = False) -> ET.Element:
-    """Return the outermost tag; undeclared prefixes are accepted, because many files have them."""
-    builder = ET.TreeBuilder(insert_comments=comments)
-    parser = expat.ParserCreate(encoding)
-    parser.CommentHandler = builder.comment if comments else None
-    parser.StartElementHandler, parser.EndElementHandler = builder.start, builder.end
-    parser.CharacterDataHandler = builder.data
-    parser.Parse(content, True)
-    return builder.close()
+    return Urdf(name, links, joints, left, tuple(notes.doubts), outlines)
 
 
 def _inertial(tag: ET.Element, notes: Notes) -> Inertial | None:
@@ -281,9 +206,7 @@ def _joint(tag: ET.Element, notes: Notes) -> UrdfJoint:
     if kind not in KINDS:
         notes.problems.append(f"{where} > type: expected one of {', '.join(KINDS)}, got '{kind}'")
     damping, friction = _dynamics(where, tag.find("dynamics"), notes)
-    limit = tag.find("limit")
-    if limit is not None and kind != "fixed":
-        notes.left("limit", where)
+    limits = _limits(where, kind, tag.find("limit"), notes)
     # exporters write zero axes for joints without an axis
     along = None if kind in ("fixed", "floating") else tag.find("axis")
     mimic = tag.find("mimic")
@@ -306,10 +229,30 @@ def _joint(tag: ET.Element, notes: Notes) -> UrdfJoint:
         numbers = (("multiplier", "1"), ("offset", "0"))
         ratio, offset = (notes.number(f"{where} > mimic", mimic, *number) for number in numbers)
         leader = Mimic(mimic.get("joint", ""), ratio, offset)
-    given = {} if limit is None else limit.attrib
-    limits = {k: notes.number(f"{where} > limit", limit, k) for k in LIMITS if k in given}
     axis = axis / (length or 1.0)
     return UrdfJoint(name, kind, parent, child, R, p, axis, damping, friction, limits, leader)
+
+
+def _limits(where: str, kind: str, tag: ET.Element | None, notes: Notes) -> dict[str, float]:
+    """Return the limits that apply to a joint: ends with lower < upper, and others above zero."""
+    given = {} if tag is None or kind == "fixed" else tag.attrib
+    found = {key: notes.number(f"{where} > limit", tag, key) for key in LIMITS if key in given}
+    found = {key: value for key, value in found.items() if abs(value) < UNLIMITED}
+    if kind not in SINGLE:
+        if found:
+            notes.left("limit", where)
+        return {}
+    low, high = found.pop("lower", 0.0), found.pop("upper", 0.0)
+    if kind != "continuous" and low < high:
+        ends = {"lower": low, "upper": high}
+    else:
+        ends = dict[str, float]()
+        if low or high:
+            notes.left("limit lower, upper", where)
+    for key in [key for key, value in found.items() if value <= 0]:  # exporters write 0 for none
+        notes.left(f'limit {key}="{given[key]}"', where)
+        del found[key]
+    return ends | found
 
 
 def _dynamics(where: str, tag: ET.Element | None, notes: Notes) -> tuple[float, float]:
@@ -318,9 +261,11 @@ def _dynamics(where: str, tag: ET.Element | None, notes: Notes) -> tuple[float, 
     A name of the specification takes precedence, even with the value zero.
     """
     inside = {} if tag is None else {one.tag: (one.text or "").strip() for one in tag} | tag.attrib
+    known = {name for names in DYNAMICS for name in names}
+    inside = {low if (low := key.lower()) in known else key: x for key, x in inside.items()}
     both = ET.Element("dynamics", inside)
     for key in inside:
-        if not any(key in names for names in DYNAMICS):
+        if key not in known:
             notes.left(f"dynamics {key}", where)
     levels: list[float] = []
     for names in DYNAMICS:

@@ -18,7 +18,7 @@ from symfric.foundation.panels import blank, grid
 from symfric.foundation.style import EDGE, colour
 from symfric.foundation.units import readable
 from symfric.foundation.variable import stacked
-from symfric.model.parts import Sketch
+from symfric.model.sketch import Sketch
 from symfric.results.films import pictures, write_gif, write_page
 from symfric.results.kinds import friction_laws
 from symfric.results.signals import Signals
@@ -214,7 +214,8 @@ def _spatial(view: View) -> tuple[Figure, Array]:
     extent = np.maximum(extent, 0.15 * extent.max())
     middle = (view.low + view.high) / 2
     for k, axis in enumerate("xyz"):
-        ticks = MaxNLocator(max(2, round(6 * extent[k] / extent.max())))
+        count = max(1, round(6 * extent[k] / extent.max()))
+        ticks = MaxNLocator(count, min_n_ticks=1)  # by default 2, whose labels would overlap
         getattr(ax, f"set_{axis}lim")(middle[k] - extent[k] / 2, middle[k] + extent[k] / 2)
         getattr(ax, f"set_{axis}label")(f"{axis} [m]")
         getattr(ax, f"{axis}axis").set_major_locator(ticks)
@@ -266,6 +267,7 @@ def style(stroke: Stroke) -> dict[str, Any]:
     styles: dict[str, dict[str, Any]] = {
         "path": {"color": shade, "linewidth": 0.8, "alpha": 0.35},
         "body": {"color": shade, "linewidth": 4.0, "solid_capstyle": "round"},
+        "outline": {"color": shade if stroke.body >= 0 else GROUND, "linewidth": 1.2},
         "arm": {"color": shade, "linewidth": 1.2},
         "centre": {"color": shade, "marker": "o", "markersize": 7.0},
         "block": {"color": shade, "linewidth": 1.2},

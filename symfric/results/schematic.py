@@ -16,9 +16,9 @@ from symfric.foundation.panels import MILLIMETRE, blank, save
 from symfric.foundation.style import COLOURS, EDGE
 from symfric.foundation.variable import starts_of, symbols_of
 from symfric.model import Contact, Model
-from symfric.model.parts import Arrow, Mark, Sketch
+from symfric.model.sketch import Arrow, Mark, Sketch
 from symfric.results.animation import style
-from symfric.results.strokes import Poses, View, look, strokes
+from symfric.results.strokes import Poses, View, look, outlines, strokes
 
 WIDTH = 85 * 72 * MILLIMETRE
 """Width of a schematic [pt]."""
@@ -95,9 +95,10 @@ def schematic(model: Model, path: str | Path | None = None) -> Figure:
     at = columns[:, 9:]
     poses = Poses(columns[:, :9].reshape(-1, 3, 3, 1), at, at[[p.centre for p in sketch.parts]])
     view = look(sketch, poses)
+    solids = [solid[:, :, 0] for part in sketch.parts for solid in outlines(part, poses)]
     figure = blank()
     for room in ROOMS:
-        page = _page(view, at[:, :, 0], *room)
+        page = _page(view, np.concatenate([at[:, :, 0], *solids]), *room)
         figure = blank(WIDTH / 72, page.height / 72, free=True)
         axes: Any = figure.add_axes((0.0, 0.0, 1.0, 1.0))
         axes.set(xlim=(0, WIDTH), ylim=(0, page.height))
@@ -129,7 +130,7 @@ def _page(view: View, at: Array, margin: float, highest: float) -> Page:
     """Return the paper with all points at least `margin` [pt] from its edges."""
     axes = np.stack([view.right, view.up])
     flat = at @ axes.T
-    low, high = flat.min(axis=0), flat.max(axis=0)
+    low, high = np.nanmin(flat, axis=0), np.nanmax(flat, axis=0)
     room = np.array([WIDTH, highest]) - 2 * margin
     scale = float(np.min(room / np.maximum(high - low, 1e-9)))
     height = max(scale * (high - low)[1] + 2 * margin, LOWEST)

@@ -171,19 +171,24 @@ class Cycle(Showing):
 def cycle(run: Signals, section: ca.SX | None, tolerance: float) -> Cycle:
     """Return the cycle that a run settles to; see `Trajectory.period`."""
     where, model = f"trajectory of '{run.scene}': period", run.model
-    states = [v for v in model.x if v.kind != MODE]
-    column = ca.vertcat(*(v.symbol for v in states))
+    states = [v for v in model.x if v.kind != MODE and v.name not in model.cyclic]
     looks = run.looks
     late = looks[looks >= (looks[0] + looks[-1]) / 2]
+    turning = [n for n in model.angles if np.ptp(run.of(model.expression(n), late)) > 2 * np.pi]
+    columns, sizes = list[ca.SX](), list[float]()
+    for v in states:  # an angle that turns returns in its sine and cosine
+        turns = v.name in turning
+        columns += [ca.sin(v.symbol), ca.cos(v.symbol)] if turns else [v.symbol]
+        sizes += [1.0, 1.0] if turns else [v.nominal]
+    column, nominal = ca.vertcat(*columns), np.array(sizes)
     values = np.atleast_2d(run.of(column, late)) if states else np.zeros((0, 1))
-    nominal = np.array([v.nominal for v in states])
     ranges = np.ptp(values, axis=1)
     moving = ranges > FLAT * nominal
     if not moving.any():
         raise ValueError(f"{where}: expected a run that moves, got one at rest in its second half")
     if section is None:
         i = int(np.argmax(ranges / nominal))
-        section = states[i].symbol - (values[i].max() + values[i].min()) / 2
+        section = columns[i] - (values[i].max() + values[i].min()) / 2
     times = crossings(partial(run.of, section), looks, 1)
     if times.size < RETURNS + 1:
         raise ValueError(
@@ -197,8 +202,8 @@ def cycle(run: Signals, section: ca.SX | None, tolerance: float) -> Cycle:
             good = int(np.flatnonzero(off > tolerance).max(initial=-1)) + 1
             start, period = float(times[-1 - n]), float(times[-1] - times[-1 - n])
             return Cycle(run, period, start, float(times[good]), times, float(off[-1]))
-    off = np.abs(at[:, 1:] - at[:, :-1]).max(axis=0)
+    off = np.abs(at[:, 1:] - at[:, :-1]).max(axis=0)[-RETURNS:].max()
     raise ValueError(
         f"{where}: expected a motion that repeats to {tolerance:g} of its range, got one that "
-        f"differs by {off[-1]:.2g} between crossings; simulate longer, or raise the tolerance"
+        f"differs by {off:.2g} between crossings; simulate longer, or raise the tolerance"
     )

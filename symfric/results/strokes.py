@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation.numeric import Array
-from symfric.model.parts import Mark, Part, Sketch
+from symfric.model.sketch import Mark, Part, Sketch
 
 Flags = NDArray[np.bool_]
 FLAT = 1e-6
@@ -38,8 +38,8 @@ class Stroke(NamedTuple):
     """Line or markers in all pictures.
 
     Attributes:
-        role: body, arm (to the end of a spring), path, block, axis, guide, rod, link, spring,
-            damper, ground (a guide fixed to the ground), anchor, centre, or joint.
+        role: body, outline, arm (to the end of a spring), path, block, axis, guide, rod, link,
+            spring, damper, ground (a guide fixed to the ground), anchor, centre, or joint.
         points: points of the line, shape (n, 3, pictures); NaN interrupts the line.
         body: number of the body, which selects the colour; -1 if the stroke belongs to no body.
         marker: marker of a joint.
@@ -84,8 +84,9 @@ class View(NamedTuple):
 
 def look(sketch: Sketch, poses: Poses) -> View:
     """Return the view that shows all places at all times."""
-    every = np.hstack([_points(poses.at), _points(poses.paths)])
-    low, high = every.min(axis=1), every.max(axis=1)
+    solids = [_points(solid) for part in sketch.parts for solid in outlines(part, poses)]
+    every = np.hstack([_points(poses.at), _points(poses.paths), *solids])
+    low, high = np.nanmin(every, axis=1), np.nanmax(every, axis=1)
     size = SYMBOL * sketch.symbols * max(float(np.max(high - low)), 1e-9)
     normal = _normal(sketch, poses)
     e, a = np.radians([ELEVATION, AZIMUTH])
@@ -97,6 +98,12 @@ def look(sketch: Sketch, poses: Poses) -> View:
 def _points(places: Array) -> Array:
     """Return the positions of all places at all times as columns, shape (3, n)."""
     return places.transpose(1, 0, 2).reshape(3, -1)
+
+
+def outlines(part: Part, poses: Poses) -> Iterator[Array]:
+    """Yield the outlines of a body in all pictures, each of shape (n, 3, pictures)."""
+    for k, points in part.outlines:
+        yield poses.at[k] + np.einsum("na,aci->nci", points, poses.axes[k])
 
 
 def _normal(sketch: Sketch, poses: Poses) -> Array | None:
@@ -150,6 +157,9 @@ def strokes(
     ]
     for k, (_, path) in enumerate(moving):
         yield Stroke("path", np.repeat(path.T[:, :, None], poses.at.shape[2], axis=2), k)
+    for part in sketch.parts:
+        if part.fixed:
+            yield from (Stroke("outline", solid) for solid in outlines(part, poses))
     for mark in sketch.marks:
         yield from _behind(mark, poses, view)
     for k, (part, _) in enumerate(moving):
@@ -164,13 +174,15 @@ def strokes(
 def _body(sketch: Sketch, part: Part, k: int, poses: Poses, view: View) -> Iterator[Stroke]:
     """Yield lines from the centre of mass to the places of a body, or a block if they coincide."""
     centre = poses.at[part.centre]
-    for role, places in (("arm", part.ends), ("body", part.corners)):
+    yield from (Stroke("outline", solid, k) for solid in outlines(part, poses))
+    for role, places in (("arm", part.ends), ("body", () if part.outlines else part.corners)):
         arms = [poses.at[c] for c in places]
         arms = [arm for arm in arms if np.abs(arm - centre).max() > 1e-9 * view.size]
         if arms:
             gap = np.full_like(centre, np.nan)
             yield Stroke(role, np.stack([p for arm in arms for p in (centre, arm, gap)]), k)
-    if not arms and not any(m.symbol.guide and m.b in part.corners for m in sketch.marks):
+    guided = any(m.symbol.guide and m.b in part.corners for m in sketch.marks)
+    if not (arms or part.outlines or guided):
         yield Stroke("block", _block(poses.axes[part.centre], centre, 1.2 * view.size), k)
     yield Stroke("centre", centre[None], k)
 

@@ -184,7 +184,8 @@ class Trajectory(packed.Portable, Signals):
     def period(self, expression: Scalar | None = None, tolerance: float = 1e-3) -> Cycle:
         """Return the cycle that the run settles to, with its period and the end of the transient.
 
-        The states at rising crossings of `expression` are compared. The period is the time of the
+        The states at rising crossings of `expression` are compared, without cyclic states
+        (`Model.cyclic`) and without whole turns of `Model.angles`. The period is the time of the
         smallest number of crossings after which all states return. The transient ends at the first
         crossing from which on every return holds.
 

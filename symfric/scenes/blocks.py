@@ -14,7 +14,7 @@ from symfric.foundation.units import turned
 from symfric.laws import Law
 from symfric.model import Model, Output, Variables
 from symfric.model.kinds import FRICTION
-from symfric.model.parts import Sketch
+from symfric.model.sketch import Sketch
 from symfric.scenes import fields
 from symfric.scenes.base import GivenInput, Scene, contact, friction_outputs, other_law, structure
 from symfric.scenes.drawing import RailBody, around, drawn

@@ -10,7 +10,7 @@ import numpy as np
 
 from symfric.foundation.numeric import Scalar
 from symfric.laws import Law
-from symfric.model.parts import Arrow, Mark, Part, Sketch, Symbol
+from symfric.model.sketch import Arrow, Mark, Part, Sketch, Symbol
 
 ALONG = {"x": ca.DM([0, 1, 0, 0, 0, 1, 1, 0, 0]), "z": ca.DM([1, 0, 0, 0, 1, 0, 0, 0, 1])}
 """Axes of a place, column by column, by direction of its rail, which is along the third axis."""

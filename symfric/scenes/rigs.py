@@ -20,7 +20,7 @@ from symfric.laws.base import smooth
 from symfric.laws.base.law import FORCE
 from symfric.laws.static.machines import tilt
 from symfric.model import Model, Monitor, Output, Variables
-from symfric.model.parts import Sketch
+from symfric.model.sketch import Sketch
 from symfric.scenes import fields
 from symfric.scenes.base import GivenInput, Scene, contact, friction_outputs
 from symfric.scenes.drawing import RailBody, drawn

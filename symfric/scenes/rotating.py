@@ -13,7 +13,7 @@ from symfric.foundation.parameters import Variable, param, parametric
 from symfric.foundation.variable import symbols_of
 from symfric.laws.base import smooth
 from symfric.model import Model, Output, Variables
-from symfric.model.parts import Sketch
+from symfric.model.sketch import Sketch
 from symfric.scenes import fields
 from symfric.scenes.base import GivenInput, Scene, contact, friction_outputs, structure
 from symfric.scenes.drawing import RailBody, drawn

@@ -6,9 +6,22 @@ import pytest
 from motions import double_integrator
 from numpy.polynomial import polynomial
 
-from ocp import Phase, Polynomial, Problem, absolute, integral, largest, soft, solve, verify_exactly
+from ocp import (
+    TIME,
+    Free,
+    Phase,
+    Polynomial,
+    Problem,
+    absolute,
+    integral,
+    largest,
+    soft,
+    solve,
+    verify_exactly,
+)
 from ocp.formulation.changed_models import Form
 from symfric import BrownMcPhee, Model, Variable, drive
+from symfric.multibody import read_urdf
 
 MODEL = double_integrator()
 EFFORT = integral(lambda s: s.a**2)
@@ -34,6 +47,23 @@ def test_rest_to_rest_in_every_form(form: Form, loss: float | None) -> None:
     else:
         assert move.cost == pytest.approx(12.0 + loss, abs=2e-3)  # a = 6 - 12 t
         assert move.verified
+
+
+def test_limits_of_a_robot_bound_its_fastest_move() -> None:
+    """2 kg over 4 m with at most 9 N and 3 m/s: d/v + v m/F = 2 s."""
+    m = read_urdf(
+        '<robot name="slider"><link name="rail"/><link name="cart"><inertial><mass value="2"/>'
+        '<inertia ixx="1" iyy="1" izz="1"/></inertial></link><joint name="slide" type="prismatic">'
+        '<parent link="rail"/><child link="cart"/>'
+        '<limit lower="-1" upper="5" effort="9" velocity="3"/></joint></robot>'
+    )
+    end = {"slide": 4.0, "slide_rate": 0.0}
+    move = solve(Problem(Phase(m.build(), Free(0.5, 9.0), end=end), TIME))
+    assert abs(move.T - 2.0) < 1e-4
+    m.limits.clear()
+    force = {"tau_slide": (-9.0, 9.0)}
+    move = solve(Problem(Phase(m.build(), Free(0.5, 9.0), end=end, bounds=force), TIME))
+    assert abs(move.T - 2 * np.sqrt(2 * 4 / 9)) < 1e-4
 
 
 def test_cubic_input_is_a_spline_and_a_polynomial_is_one_per_phase() -> None:

@@ -18,13 +18,14 @@ from hashlib import sha256
 from importlib.metadata import version
 from pathlib import Path
 from re import ASCII, fullmatch
-from typing import NamedTuple, final
+from typing import NamedTuple, Protocol, final
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from symfric.emitter.c99 import FUNCTIONS, Real, block_comment
+from symfric.emitter.emit import Code
 from symfric.emitter.rolling import Array, Arrays
 from symfric.foundation import checks
 from symfric.foundation.graph import graph
@@ -285,18 +286,32 @@ class Block:
         return ca.Function(name, columns, dense, list(GROUPS[:3]), list(results))
 
 
+class Statements(Protocol):
+    """Author of the statements of a step, in place of `emit`."""
+
+    def code(self, targets: Sequence[Sequence[str]], loads: Mapping[tuple[int, int], str]) -> Code:
+        """Return the statements of a step, for the arguments of `emit`."""
+        ...
+
+    def helpers(self, text: str) -> str:
+        """Return the functions that the C `text` calls."""
+        ...
+
+
 @final
 @dataclass(frozen=True, eq=False)
 class CBlock:
-    """Block as C in one floating-point type.
+    """Block as C in one type of numbers.
 
     Attributes:
         guards: True if the C checks its numbers, see `symfric.codegen.guards`.
+        author: author of the statements; None for those of `emit`.
     """
 
     block: Block
     real: Real
     guards: bool = True
+    author: Statements | None = None
 
     @property
     def name(self) -> str:

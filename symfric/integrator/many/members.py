@@ -18,6 +18,7 @@ from symfric.foundation.numeric import Array
 from symfric.foundation.packed import state_of
 from symfric.integrator.compiled.columns import Columns, densified
 from symfric.integrator.compiled.compiler import load
+from symfric.integrator.compiled.loops import generated
 from symfric.integrator.equations.blocks import Following
 from symfric.integrator.equations.initial import ASSEMBLED, FLOOR, ITERATIONS, AlgebraicEquations
 from symfric.integrator.equations.manifold import Manifold
@@ -178,9 +179,7 @@ def many_source(
     sizes |= {"WORK": max(work, more), "GROUPS": groups}
     jump = ""
     if follow is not None:
-        generator = ca.CodeGenerator("symfric_round.c", {"static_aux": True})
-        generator.add(follow.round)
-        jump = generator.dump() + follow.c_source
+        jump = generated("symfric_round", follow.round) + follow.c_source
     written = f"{jump}{lanes_header(lanes)}\n{of_step}{of_values}"
     return written + defined(sizes) + c_text("loop.h")
 

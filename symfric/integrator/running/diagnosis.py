@@ -108,9 +108,8 @@ def _unbounded(system: System, y: Array, f: Array, h: float) -> str:
     """Return a message if states are huge, or if they are large and grow ever faster."""
     x, rate = y[: system.nx], np.nan_to_num(f[: system.nx], posinf=0.0, neginf=0.0)
     huge = np.abs(x) > 1e10 * system.nominal
-    runaway = (
-        (np.abs(x) > 1e3 * system.nominal) & (x * rate > 0) & (np.abs(x) < 1e3 * h * abs(rate))
-    )
+    alike, soon = np.sign(x) == np.sign(rate), np.abs(x) / 1e3 < h * abs(rate)
+    runaway = (np.abs(x) > 1e3 * system.nominal) & alike & soon
     grown = listed(f"{system.names[i]} = {x[i]:.3g}" for i in np.flatnonzero(huge | runaway))
     return f"{grown} grows without bound; check signs and parameters" if grown else ""
 

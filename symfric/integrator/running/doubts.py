@@ -1,4 +1,4 @@
-"""Warnings about successful runs: friction above its static level, and friction that adds energy.
+"""Warnings about successful runs: friction above its static level or that adds energy, limits.
 
 Energy: a law whose force has the wrong sign adds energy to the motion. Two conditions are checked:
 
@@ -10,6 +10,9 @@ laws with an offset push within their smoothing velocity, so both conditions are
 integral uses the trapezoidal rule over steps, since only its sign matters.
 Limits: a wrong sign in hand-written equations outside the law is not detected; ensembles are not
 checked.
+
+Limits: a state, an algebraic variable or an input leaves the bounds of its `Variable`, by more than
+a thousandth of the larger bound.
 
 Overload: the states of a law carry more than in any possible motion, usually its static level.
 
@@ -27,7 +30,7 @@ only if it is constant.
 from collections.abc import Callable, Collection, Hashable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from math import inf
+from math import inf, isfinite
 from typing import Any, final
 
 import casadi as ca
@@ -35,7 +38,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation.numeric import Array
-from symfric.foundation.status import EnergyWarning, OverloadWarning
+from symfric.foundation.status import EnergyWarning, LimitWarning, OverloadWarning
 from symfric.foundation.variable import stacked, strays, symbols_of
 from symfric.integrator.compiled.columns import Columns
 from symfric.integrator.equations.inputs import InputData
@@ -53,6 +56,8 @@ SHARE = 1e-3
 """Allowed energy gain, as a fraction of the energy turnover, for rounding and quadrature errors."""
 REMEMBERED = 16
 """Number of parameter sets whose first check is cached."""
+CLEAR = 1e-3
+"""Fraction of the larger bound, or of the nominal value for 0, beyond which it is exceeded."""
 MARGIN = 0.05
 """Fraction by which integration errors may raise friction above its level."""
 WIDE = 0.25
@@ -75,7 +80,28 @@ def doubts(
     for sliding in sliding_places(integrator.model):
         if sliding.suspect(p):
             found += [EnergyWarning(text) for text in _gains(sliding, integrator, inputs, run, p)]
+    if text := "; ".join(_exceeded(integrator, inputs, run, p)):
+        found.append(LimitWarning(f"Bounds are exceeded: {text}."))
     return found
+
+
+def _exceeded(integrator: Integrator, inputs: InputData, run: RunRecord, p: Array) -> Iterator[str]:
+    """Yield each variable that leaves its bounds, with the time and the farthest value."""
+    model = integrator.model
+    every = (v for group in (model.x, model.z, model.u) for v in group)
+    limited = [v for v in every if isfinite(v.lower) or isfinite(v.upper)]
+    if not limited:
+        return
+    t, y = run.seen
+    values = _over_time(integrator, inputs, "bounded", symbols_of(limited), t, y, p)
+    for v, x in zip(limited, values, strict=True):
+        beyond = np.maximum(v.lower - x, x - v.upper)
+        size = max(abs(b) for b in (v.lower, v.upper) if isfinite(b)) or v.nominal
+        if (outside := beyond > CLEAR * size).any():
+            k = int(outside.argmax())
+            first = np.interp(0.0, beyond[k - 1 : k + 1], t[k - 1 : k + 1]) if k else t[0]
+            value, allowed = x[beyond.argmax()], f"{v.lower:.4g} ... {v.upper:.4g}"
+            yield f"{v.name} from t = {first:.3g} s, up to {value:.4g} {v.unit} ({allowed})"
 
 
 def _over_time(

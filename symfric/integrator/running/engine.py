@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from symfric.foundation.numeric import Array, address, bound
 from symfric.integrator.compiled.columns import filled
 from symfric.integrator.compiled.compiler import load
+from symfric.integrator.compiled.loops import generated
 from symfric.integrator.equations.blocks import Following
 from symfric.integrator.equations.initial import FLOOR, SURE
 from symfric.integrator.methods.attempt import GROWTH_MEMORY, RRow, SRow
@@ -292,10 +293,7 @@ def c_source(
     `others` are Functions that other C code calls by name. Without events, the code contains no
     event search.
     """
-    generator = ca.CodeGenerator("symfric_step.c", {"static_aux": True})
     called = (step, *(crossings.functions if crossings else ()))
-    for function in (*called, *others):
-        generator.add(function)
     n, given = step.numel_in(0) - SRow.MEMORY, step.numel_in(1)
     attempts = filled(
         FOLDER / "attempts.c", *called,
@@ -304,7 +302,7 @@ def c_source(
         jump=crossings.width if crossings else 0, searches=int(crossings is not None),
     )  # fmt: skip
     search = "" if crossings is None else search_source(crossings, given)
-    return generator.dump() + search + attempts
+    return generated("symfric_step", *called, *others) + search + attempts
 
 
 def loop_source(

@@ -2,23 +2,23 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import wraps
 from inspect import cleandoc
 from math import inf, isfinite
 from re import DOTALL, search
 from typing import TYPE_CHECKING, Any, ClassVar
 
-import casadi as ca
 import numpy as np
 
-from symfric.foundation import checks
+from symfric.foundation import checks, units
 from symfric.foundation.numeric import Scalar, empty, equals, is_casadi, is_number, is_symbolic
 from symfric.foundation.parameters import Parametric, parameters, parametric
 from symfric.foundation.symbolic import plain
 from symfric.foundation.vector import VectorRows
 from symfric.laws.base import smooth
-from symfric.laws.base.phenomena import CONFIDENCE
+from symfric.laws.base.parts import CONFIDENCE, called, check_class, of_user
+from symfric.laws.base.parts import Switch as Switch
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -76,6 +76,9 @@ class State:
     whole: bool = False
 
     def __post_init__(self) -> None:
+        checks.identifier("state: name", self.name)
+        if units.in_si(self.unit) not in (None, 1.0):
+            raise checks.refused(f"state '{self.name}': unit", "an SI unit", self.unit)
         hint = "parameters are symbols in fits and generated code, so give a number for all values"
         checks.number(f"state '{self.name}': nominal", self.nominal, above=0.0, hint=hint)
 
@@ -99,33 +102,11 @@ APPLIED_FORCE = Input(FORCE, "N", "force that keeps the sliding velocity constan
 """Force that the contact must carry for zero acceleration: m dv/dt = F_e - F."""
 
 
-@dataclass(frozen=True, eq=False)
-class Switch:
-    """Change of mode: the states in `reset` jump when `expression` passes through zero.
-
-    Attributes:
-        expression: function of v, N, z and the further inputs of the law.
-        direction: 1 for rising zeros only, -1 for falling zeros only, 0 for both.
-        reset: maps a state to its value after the change, in terms of the values before it.
-        halts: True if the sliding velocity is set to exactly zero at the change.
-        at_start: True if it also occurs at the start when the expression is already beyond zero.
-        rtol: largest relative tolerance of a run, for laws that require accurate instants.
-    """
-
-    name: str
-    expression: Scalar
-    direction: int = 0
-    reset: Mapping[str, Scalar] = field(default_factory=dict[str, Scalar])
-    halts: bool = False
-    at_start: bool = False
-    rtol: float = inf
-
-
 def with_states(method: Callable[..., Any]) -> Callable[..., Any]:
     """Wrap `method(law, v, N, z)` so that it accepts states in any common form, with checks."""
 
     @wraps(method)
-    def checked(law: "Law", v: Scalar, N: Scalar, z: Scalar = (), *more: Any, **inputs: Any) -> Any:
+    def checked(law: Any, v: Scalar, N: Scalar, z: Scalar = (), *more: Any, **inputs: Any) -> Any:
         slip, load = plain(v), plain(N)
         for name, value in (("v", slip), ("N", load)):
             if type(value) is int and not is_number(value):
@@ -134,36 +115,10 @@ def with_states(method: Callable[..., Any]) -> Callable[..., Any]:
         states = states_of(law, slip, plain(z))
         if type(law).__module__.startswith("symfric."):
             return method(law, slip, load, states, *more, **inputs)
-        where = f"{type(law).__name__}.{method.__name__}"
-        try:
-            value = method(law, slip, load, states, *more, **inputs)
-        except (TypeError, ValueError, RuntimeError) as error:
-            if not isinstance(slip, np.ndarray) and "truth value" not in str(error):
-                raise
-            raise _unsuitable(where, slip, error) from error
-        if value is None or isinstance(value, list | tuple):
-            raise _unsuitable(where, slip, value)
-        if not is_casadi(value) or is_casadi(slip, load, states, *inputs.values()):
-            return value
-        shape = np.shape(slip) if method.__name__ == "force" else np.shape(states)
-        if not isinstance(value, ca.DM) or value.numel() != np.prod(shape, dtype=int):
-            raise _unsuitable(where, slip, value)
-        return value.full().reshape(shape)[()]
+        like = slip if method.__name__ == "force" else states
+        return called(method, law, (slip, load, states, *more), inputs, like)
 
     return checked
-
-
-def _unsuitable(where: str, v: Scalar, got: object) -> ValueError:
-    """Return the error for a method of a user's law that fails, or returns an unsuitable value."""
-    if "truth value" in str(got):
-        return ValueError(
-            f"{where}: expected an expression, got a condition that Python evaluates (if, and, or, "
-            "max, min); write smooth.choose(v > 0, a, b) of symfric.laws"
-        )
-    what, hint = "a force, or a column of rates", "write ca.vertcat(...) for several rates"
-    if isinstance(v, np.ndarray) and not isinstance(got, list | tuple):
-        what, hint = "an array for velocities in an array", "write it with symfric.laws.smooth"
-    return checks.refused(where, what, got, hint)
 
 
 @parametric
@@ -186,6 +141,10 @@ class Law(Parametric, ABC):
 
     def __init_subclass__(cls, **keywords: Any) -> None:
         super().__init_subclass__(**keywords)
+        if not cls.__module__.startswith("symfric."):
+            check_class(cls)
+            if "outside" in vars(cls):
+                cls.outside = of_user(cls.outside)
         for name in ("force", "rate"):
             if name in vars(cls):
                 setattr(cls, name, with_states(vars(cls)[name]))
@@ -335,6 +294,8 @@ def chosen(law: Law, inputs: Mapping[str, Scalar]) -> dict[str, Scalar]:
 def require_law(where: str, law: object) -> None:
     """Raise an error if `law` is not a law; the hint covers the class and the name of a law."""
     if isinstance(law, Law):
+        if not type(law).__module__.startswith("symfric."):
+            _check_states(type(law).__name__, law.states)
         return
     hint = ""
     if isinstance(law, type) and issubclass(law, Law):
@@ -342,6 +303,16 @@ def require_law(where: str, law: object) -> None:
     elif isinstance(law, str):
         hint = f"use law_from_text({law!r})"
     raise checks.refused(where, "a law such as LuGre()", law, hint)
+
+
+def _check_states(name: str, states: object) -> None:
+    """Raise an error if the states of a user's law are not a tuple of states with own names."""
+    if not isinstance(states, tuple | list) or not all(isinstance(s, State) for s in states):
+        hint = "a method that returns them needs @property"
+        raise checks.refused(f"{name}: states", "a tuple of State(...)", states, hint)
+    names = [state.name for state in states]
+    if len(set(names)) < len(names):
+        raise checks.refused(f"{name}: states", "every name once", ", ".join(names))
 
 
 @parametric
@@ -368,7 +339,7 @@ class StaticLaw(Law):
         return empty(v)
 
 
-def states_of(law: Law, v: Scalar, z: Scalar) -> Scalar:
+def states_of(law: Any, v: Scalar, z: Scalar) -> Scalar:
     """Return `z` with one row for each state of `law`.
 
     If the law has one state, `z` may be a number, or an array of the shape of the velocities.

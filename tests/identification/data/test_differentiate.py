@@ -136,6 +136,12 @@ def test_noise_of_a_differenced_position_is_recognised(rate: Any) -> None:
     assert found is None or np.sqrt(found[0]) == pytest.approx(2e-3, rel=0.1)
 
 
+def test_a_spectrum_without_its_line_is_that_of_the_rest() -> None:
+    n = np.arange(1000)
+    wave = np.sin(np.pi / 111 * n)
+    np.testing.assert_allclose(spectrum(wave + 0.2 * n - 3.0, line=True), spectrum(wave), atol=1e-9)
+
+
 def test_band_of_a_position_sampled_slower_than_once_a_second() -> None:
     """An average over 1 Hz is wider than the whole spectrum then."""
     for step in (1.0, 1e3):

@@ -14,19 +14,12 @@ from phases import SLIDER_CRANK, slider_crank, solve_once, unit_move
 
 from ocp.checking.interval_errors import cut_meshes, local_errors, zoh_losses
 from ocp.checking.mesh_refinement import Goals, MeshErrors, refined, refined_solve
-from ocp.checking.resimulate import Arc, arcs_of, resimulated
-from ocp.checking.verify import verified, verified_arcs, verify
+from ocp.checking.resimulate import Arc, arcs_of, resimulated, run_from
+from ocp.checking.verify import left_between, verified, verified_arcs, verify
 from ocp.formulation.expressions import TIME, integral
 from ocp.formulation.phase import FREE, Free, Phase
 from ocp.formulation.problem import Problem
-from ocp.problems import (
-    READY,
-    alp_rider,
-    brachistochrone,
-    bryson_denham,
-    goddard,
-    hang_glider,
-)  # fmt: skip
+from ocp.problems import READY, alp_rider, brachistochrone, bryson_denham, goddard, hang_glider
 from ocp.solving.methods import Ipopt
 from ocp.solving.one_solve import Task
 from ocp.solving.prepared import Supervisor
@@ -37,7 +30,7 @@ from ocp.transcription.transcribe import discretise
 from symfric.foundation.parameters import Variable
 from symfric.foundation.status import Status
 from symfric.laws import BrownMcPhee
-from symfric.model import Model
+from symfric.model import Model, Output
 
 EFFORT = integral(lambda s: s.a**2)
 
@@ -71,6 +64,20 @@ def test_bound_violated_between_nodes_is_found_at_its_worst() -> None:
     assert miss.time == pytest.approx(1.0, abs=1e-3)
     assert miss.miss == pytest.approx(0.04, abs=1e-6)
     assert "x is violated by 0.04 m at 1 s" in found.sentence
+
+
+@pytest.mark.parametrize("restarts", [[0], [0, 1, 2]])
+def test_bounds_between_nodes_are_relative_to_the_whole_arc(restarts: list[int]) -> None:
+    """The room is 0.49 m at the start, 0.046 m at the inner nodes, and -0.01 m between them."""
+    room = {"room": Output(0.49 - CART.x[0].symbol, "m")}
+    stage = Model("room", x=CART.x, u=CART.u, ode=CART.ode, outputs=room)
+    phase = Phase(stage, 2.0, start={"v": 1.0})
+    problem = Problem(phase, EFFORT, bounds={"room": (0.0, None)})
+    arc = replace(there_and_back()[1], span=problem.spans[0])
+    ends = zip(restarts, arc.times[[*restarts[1:], -1]], strict=True)
+    runs = [run_from(arc, node, arc.state(node))._replace(end=end) for node, end in ends]
+    assert left_between(runs, 0.01).tolist() == [False, True, False]
+    assert not left_between(runs, 0.1).any()  # a tenth of 0.49 m, not of 0.046 m
 
 
 def test_end_and_cost_that_the_control_misses() -> None:

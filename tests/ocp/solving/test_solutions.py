@@ -257,6 +257,24 @@ def test_files_of_other_programs_and_versions_are_refused(tmp_path: Path) -> Non
             load(tmp_path / name)
 
 
+def test_files_whose_numbers_do_not_fit_the_problem_are_refused(tmp_path: Path) -> None:
+    whole = two()
+    best = whole.optimum
+    assert best is not None
+    made, found = best.transcription, best.iterate
+    first, *rest = made.meshes
+    for name, wrong in {
+        "lam_g": replace(best, iterate=replace(found, lam_g=found.lam_g[1:])),
+        "lam_w": replace(best, iterate=replace(found, lam_w=found.lam_w[None])),
+        "values": replace(best, values=best.values[1:]),
+        "mesh": replace(best, transcription=replace(made, meshes=(first[1:], *rest))),
+        "order": replace(best, transcription=replace(made, meshes=(first[[0, 2, 1, -1]], *rest))),
+    }.items():
+        replace(whole, optimum=wrong).save(tmp_path / name)
+        with pytest.raises(ValueError, match="or a damaged one"):
+            load(tmp_path / name)
+
+
 def test_file_that_names_modules_of_older_versions_loads(back: Solution, tmp_path: Path) -> None:
     back.save(tmp_path / "back.npz")
     with np.load(tmp_path / "back.npz") as held:

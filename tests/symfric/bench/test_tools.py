@@ -21,6 +21,7 @@ from symfric.bench.codegen import PROVEN, plants, trials
 from symfric.bench.identification import files, outcome
 from symfric.bench.identification_files import campaign
 from symfric.bench.identification_memory import ranked
+from symfric.bench.identification_online import Axis, judged
 from symfric.bench.identification_records import ar
 from symfric.bench.identification_repeats import far
 from symfric.bench.interop import GOAL, ROUTES, STEPS, N, T, missed, move
@@ -218,6 +219,18 @@ def test_cores_are_measured_and_compared_with_the_c_of_casadi(
     assert 0 < one < many
     assert {(r["unit test"], r["status"]) for r in rows} == {("ok", "measured")}
     assert max(r["relative error"] for r in rows) < 1e-6
+
+
+def test_an_axis_states_the_noise_of_its_encoder_and_estimates_are_judged() -> None:
+    axis, random = Axis(4), np.random.default_rng(0)
+    count, x = axis.drawn["count"], random.uniform(0.0, 1e-3, 20_000)
+    jitter = axis.drawn["noise"] * random.standard_normal(x.size)
+    read = count * np.round(x / count + jitter)
+    assert np.std(read - x) == pytest.approx(axis.position_noise, rel=0.02)
+    t = np.linspace(0.0, 1.0, 101)
+    for deviation, share in ((0.04, 0.0), (0.06, 100.0)):
+        found = judged(3.0 * (t - 0.03), np.full(t.size, deviation), 3.0 * t, 0.01)
+        assert list(found.values()) == pytest.approx([0.03, -0.09, 0.09, share])
 
 
 def test_absent_tools_are_named(monkeypatch: pytest.MonkeyPatch) -> None:

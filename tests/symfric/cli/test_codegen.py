@@ -70,6 +70,22 @@ def test_parameters_are_variable_unless_folded(symfric) -> None:
     assert "rad/s" in shown and "mode" in shown
 
 
+def test_a_law_becomes_integers(symfric) -> None:
+    line = "codegen coulomb --real fixed --out c --range N=0:20"
+    found = symfric(f"{line} --range v=-1:1 --json r.json")
+    result = json.loads(Path("r.json").read_text())
+    assert 0.0 < result["measured"]["F"] <= result["proven"]["F"] < 1e-6
+    assert "integers of 32 bits" in found.out
+    assert "times 2^30 [m/s], +-1" in Path("c/coulomb_q31.h").read_text()
+    for given, text in {
+        line: "expected a range of v [m/s], got none",
+        f"{line} --range v=1": "--range v=LOW:HIGH: expected a finite number",
+        f"{line} --no-guards": "--real fixed: expected none of --no-guards",
+        "codegen gms --range v=0:1 --estimator kalman --out c": "expected none of --estimator",
+    }.items():
+        assert text in symfric(given, 2).err
+
+
 def test_a_proof_is_shown_and_decides_the_exit_status(symfric, monkeypatch) -> None:
     line = "codegen --law stribeck --out c --real float --no-kit --prove"
     for ranges, status, shown in (

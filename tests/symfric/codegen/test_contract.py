@@ -154,9 +154,9 @@ int main(void)
 """
 
 
-@pytest.mark.parametrize("stride", [1009, pytest.param(1, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("stride", [1009, pytest.param(61, marks=pytest.mark.slow)])  # primes
 def test_comparing_bits_equals_comparing_numbers(stride, compiler, tmp_path):
-    """The functions of the C and those of the proof agree for every float."""
+    """The functions of the C and those of the proof agree for floats of every exponent."""
     parts = comparisons(CBlock(replace(LIMITED, name="f"), FLOAT))
     functions = "\n".join(parts[what] for what in ("bits", "beyond", "outside"))
     text = AGREE.format(
@@ -167,7 +167,7 @@ def test_comparing_bits_equals_comparing_numbers(stride, compiler, tmp_path):
     (tmp_path / "agree.c").write_text(text)
     program = str(tmp_path / "agree")
     compiler.run("-std=c99", "-O2", str(tmp_path / "agree.c"), "-o", program)
-    assert finished([program], limit=600.0).output == b"0\n"
+    assert finished([program], limit=120.0).output == b"0\n"
 
 
 @pytest.mark.parametrize(

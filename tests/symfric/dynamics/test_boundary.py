@@ -34,7 +34,7 @@ def test_hopf_points_are_where_damping_equals_the_slope_of_friction() -> None:
             assert c == pytest.approx(10 / scale * share * np.exp(-(share**2)), rel=1e-9)
             assert found.periods == pytest.approx(np.full(v.size, np.pi), rel=1e-9)
             assert c.max() * scale == pytest.approx(10 * np.sqrt(0.5) * np.exp(-0.5), rel=0.03)
-            assert found.message == "ends at the given range; ends at the given range"
+            assert found.message == "ends at the given range"
             assert "Hopf points of 'belt'" in repr(found)
             (axis,) = found.plot().axes
             assert axis.get_xlabel() == "c [N s/m]" and axis.get_ylabel() == "v_b [m/s]"

@@ -26,6 +26,7 @@ from symfric.dynamics import (
     continuation,
     curve,
     equilibrium,
+    linearize,
     load_branch,
     orbits_from,
     periodic_orbit,
@@ -157,6 +158,31 @@ def test_equilibria_pass_a_fold_and_a_branch_point() -> None:
     (found,) = line.special
     assert found.kind == "branch point" and abs(found.value) < 1e-9
     assert (line.stable == (line.values < 0)).all() and np.abs(line.x).max() < 1e-9
+
+
+def test_stability_of_a_branch_is_that_of_its_linear_models() -> None:
+    x, v, p = Variable("x", "m"), Variable("v", "m/s"), Variable("p", "1", start=0.3)
+    rates = {
+        0: ca.vertcat(v, -(1 + p) * x),
+        1: ca.vertcat(v, p - v),  # x is cyclic
+        -1: ca.vertcat(v, (1 + p) * v - x),
+    }
+    for expected, ode in rates.items():
+        at = equilibrium(Model("two", x=(x, v), p=(p,), ode=ode))
+        branch = continuation(at, "p", (0.1, 0.5), points=9)
+        assert (branch.stability == expected).all()
+        assert linearize(at.model, at).stable is {1: True, 0: None, -1: False}[expected]
+        assert {1: "stable", 0: "limit", -1: "unstable"}[expected] in repr(branch)
+    assert [*set(branch.to_dict()["stable"])] == [False]
+
+
+def test_the_number_of_points_counts_both_directions() -> None:
+    x, p = Variable("x", "m"), Variable("p", "1", start=0.49)
+    at = equilibrium(family(p - x, x, p))
+    for points, message in ((9, "ends after 9 points"), (80, "ends at the given range")):
+        branch = continuation(at, "p", (-2.0, 0.5), points=points)
+        assert branch.values.size <= points and branch.message.split("; ")[0] == message
+    assert continuation(at, "p", (-2.0, 0.5), points=9).values.size == 9
 
 
 def test_a_radial_oscillator_has_its_branch_of_orbits() -> None:

@@ -7,12 +7,22 @@ import numpy as np
 import pytest
 from hunting import hunting
 
-from symfric import ExactCoulomb, LuGre, Model, Variable, contact, drive, rabinowicz, simulate
+from symfric import (
+    ExactCoulomb,
+    LuGre,
+    Model,
+    Output,
+    Variable,
+    contact,
+    drive,
+    rabinowicz,
+    simulate,
+)
 from symfric.bench.dynamics import grazing, hopf_speed, linear, stick_slip
-from symfric.dynamics import equilibrium, linearize, periodic_orbit
+from symfric.dynamics import continuation, equilibrium, linearize, periodic_orbit
 from symfric.laws import BrownMcPhee, Stribeck, Viscous
 from symfric.multibody import JointSpringDamper
-from symfric.scenes import CoupledBlocks, SliderCrank
+from symfric.scenes import CoupledBlocks, DrillString, SliderCrank
 
 
 def test_the_closed_forms_of_the_benchmark_are_met() -> None:
@@ -166,3 +176,43 @@ def test_a_symmetric_orbit_of_a_machine_without_symmetry_is_refused() -> None:
     belt = rabinowicz(BrownMcPhee())
     with pytest.raises(ValueError, match="near the guess"):
         periodic_orbit(belt, simulate(belt, 30.0), symmetric=True)
+
+
+def test_a_drill_string_sticks_and_slips_up_to_a_speed_of_the_top() -> None:
+    """The mean speed of the bit is that of the top; runs next to the limit confirm it."""
+    string = DrillString(ExactCoulomb(mu_s=0.8, mu_d=0.5), lumps=1).model()
+    given = {"w_top": 2.0}
+    orbit = periodic_orbit(string, simulate(string, 300.0, u=given), u=given)
+    assert orbit.stable and orbit.drift == pytest.approx({"phi": 2.0 * orbit.period}, rel=1e-9)
+    assert "phi changes by" in repr(orbit)
+    branch = continuation(orbit, "w_top", (1.5, 5.0), points=60)
+    (limit,) = branch.special
+    assert limit.kind == "grazing"
+    last = dict(zip(orbit.x, branch.x[limit.index - 1].tolist(), strict=True))
+    for side in (-1, 1):
+        u = {"w_top": limit.value + side * 2e-4}
+        run = simulate(string, 2000.0, x0=last, u=u, rtol=1e-9)
+        assert (run.final["w_bit"] == pytest.approx(u["w_top"], abs=1e-3)) is (side > 0)
+        assert (len(run.happened) > 100) is (side < 0)
+
+
+def test_a_rotor_turns_with_the_multiplier_of_liouville() -> None:
+    """And the work of its torque in a turn is what friction takes."""
+    phi, w, T = Variable("phi", "rad"), Variable("w", "rad/s"), Variable("T", "N m", start=2.0)
+    bearing = contact("bearing", BrownMcPhee(mu_s=0.4, mu_d=0.3), w.symbol, 1.0)
+    torque = T - bearing.force - w / 10 - 4 * ca.sin(phi)
+    losses = (bearing.force + w / 10) * w.symbol
+    results = {"growth": Output(ca.jacobian(torque, w.symbol), "1/s"), "loss": Output(losses, "W")}
+    rotor = Model(
+        "rotor", x=(phi, w), u=(T,), ode=ca.vertcat(w, torque), contacts=(bearing,), outputs=results
+    )
+    given = {"T": 2.0}
+    run = simulate(rotor, 120.0, x0={"w": 12.0}, u=given)
+    orbit = periodic_orbit(rotor, run, u=given)
+    assert rotor.angles == ("phi",) and rotor.cyclic == ()
+    assert orbit.drift == pytest.approx({"phi": 2 * np.pi}, rel=1e-8)
+    assert orbit.period * orbit.cycle.mean("loss") == pytest.approx(2.0 * 2 * np.pi, rel=1e-8)
+    growth = np.exp(orbit.period * orbit.cycle.mean("growth"))
+    assert orbit.multipliers == pytest.approx([growth], rel=1e-7)
+    branch = continuation(orbit, "T", (1.9, 2.1), points=9)
+    assert branch.stable.all() and branch.orbit(0).drift["phi"] == pytest.approx(2 * np.pi)

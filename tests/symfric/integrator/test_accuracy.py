@@ -83,16 +83,19 @@ def test_solution_is_that_of_scipy(name: str, rates: object, start: list[float])
     assert deviation(ours["v"], scipy[1]) < 1e-8
 
 
+@cache
+def break_away(model: sf.Model, v: float, span: float) -> Array:
+    return sf.simulate(model, span, rtol=1e-9, method="rodas4p", x0={"v": v})["x"]
+
+
 def worst_break_away(
     model: sf.Model, velocities: Array, span: float = SPAN, **run: object
 ) -> float:
     """Largest position error over runs from several start velocities."""
     worst = 0.0
     for v in velocities.tolist():
-        x0 = {"v": v}
-        expected = sf.simulate(model, span, rtol=1e-9, method="rodas4p", x0=x0)["x"]
-        found = sf.simulate(model, span, x0=x0, **run)["x"]  # type: ignore[arg-type]
-        worst = max(worst, deviation(found, expected))
+        found = sf.simulate(model, span, x0={"v": v}, **run)["x"]  # type: ignore[arg-type]
+        worst = max(worst, deviation(found, break_away(model, v, span)))
     return worst
 
 
@@ -212,8 +215,7 @@ def test_steps_of_one_run_span_twelve_decades() -> None:
     assert run.at(1e-12)["fast"][0] == pytest.approx(1 + np.exp(-1), rel=1e-6)
 
 
-SCENES, SEED = 500, 10
-CYCLES = 6
+SEED, CYCLES = 10, 6
 
 
 def drawn(rng: np.random.Generator) -> tuple[sf.Model, float]:
@@ -252,23 +254,26 @@ def slips(
     return begins, float(np.diff(begins).min(initial=t_end)) / 2
 
 
-def lost(model: sf.Model, t_end: float, rtol: float) -> bool:
-    """Return True if a slip of the reference is missing, or an extra one is there."""
+def lost(model: sf.Model, t_end: float) -> list[float]:
+    """Tolerances at which a slip of the reference is missing, or an extra one is there."""
     expected, near = slips(model, t_end, 1e-10, "rodas4p")
-    found, _ = slips(model, t_end, rtol)
     before = t_end - near  # the last one may begin beyond the end
-    return (expected < before).sum() != (found < before).sum() or any(
-        float(np.abs(found - t).min(initial=np.inf)) > near for t in expected[expected < before]
-    )
+    expected, wrong = expected[expected < before], list[float]()
+    for rtol in (1e-4, 1e-5, 1e-6):
+        found, _ = slips(model, t_end, rtol)
+        far = (np.abs(found - t).min(initial=np.inf) > near for t in expected)
+        if expected.size != (found < before).sum() or any(far):
+            wrong.append(rtol)
+    return wrong
 
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:.*rtol")
-@pytest.mark.parametrize(("rtol", "allowed"), [(1e-4, 1), (1e-5, 0), (1e-6, 0)])
-def test_no_break_away_of_500_random_machines_is_lost(rtol: float, allowed: int) -> None:
-    rng = np.random.default_rng(SEED)
-    failed = [k for k in range(SCENES) if lost(*drawn(rng), rtol)]
-    assert len(failed) <= allowed, f"machines {failed}"
+@pytest.mark.parametrize("tenth", range(10))
+def test_no_break_away_of_500_random_machines_is_lost(tenth: int) -> None:
+    rng = np.random.default_rng([SEED, tenth])
+    failed = {k: wrong for k in range(50) if (wrong := lost(*drawn(rng)))}
+    assert not failed
 
 
 def test_machines_that_are_drawn_stick_and_slip() -> None:

@@ -91,9 +91,9 @@ def test_runs_come_back_to_the_bit_from_files_and_pickles(tmp_path: Path) -> Non
 
 
 def test_the_model_of_a_loaded_run_simulates_to_the_bit(tmp_path: Path) -> None:
-    run = simulate(Pendulum(ExactCoulomb()).model(), 0.3, samples=51)
+    run = simulate(Pendulum(ExactCoulomb()).model(), 0.3, samples=51, backend="vm")
     loaded = through_file(run, tmp_path)
-    assert_same(run, simulate(loaded.model, 0.3, samples=51))
+    assert_same(run, simulate(loaded.model, 0.3, samples=51, backend="vm"))
     balance = loaded.energy_balance()
     assert balance.to_dict() == run.energy_balance().to_dict()
 
@@ -102,9 +102,9 @@ def test_a_run_of_many_steps_is_stored_whole(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     model = rabinowicz(LuGre())
-    whole = simulate(model, 6.0, samples=11)
+    whole = simulate(model, 6.0, samples=11, backend="vm")
     monkeypatch.setattr(running, "MOST_BYTES", 10_000)
-    cut = simulate(model, 6.0, samples=11)
+    cut = simulate(model, 6.0, samples=11, backend="vm")
     loaded = through_file(cut, tmp_path)
     monkeypatch.undo()
     assert loaded.step_times.size == whole.step_times.size == whole.statistics.steps + 1

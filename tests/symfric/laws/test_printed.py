@@ -5,6 +5,8 @@ The catalogue printed.toml has levels of 1 N and 1.5 N and a characteristic velo
 `check_law`: laws of the catalogue pass, and every fault of a law is found.
 """
 
+import math
+import re
 import tomllib
 from dataclasses import replace
 from itertools import product
@@ -19,6 +21,7 @@ import printed_laws
 import pytest
 from law_cases import CASES
 from printed_laws import PRINTED
+from tables import table
 
 import symfric as sf
 from symfric.laws import smooth
@@ -268,6 +271,8 @@ WRONG: dict[str, tuple[sf.Law, str, str]] = {
     "active": (
         with_rate(lambda s, v, N, z: rate(s, v, N, z) + 500 * z[0]), "passivity", "not passive",
     ),
+    "rows": (with_rate(lambda s, v, N, z: ca.vertcat(v, v)), "values", "as states, 1, got 2"),
+    "index": (with_rate(lambda s, v, N, z: ca.vertcat(v - z[1])), "values", r"z\[k\] of the st"),
     "moving": (with_rate(lambda s, v, N, z: rate(s, v, 2 * N, z)), "states", "still changes"),
 }  # fmt: skip
 """Wrong law, and topic and pattern of the sentence about it."""
@@ -318,6 +323,24 @@ def test_a_class_without_its_decorator_is_refused() -> None:
     )
     with pytest.raises(ValueError, match=r"Bare: expected the decorator @parametric .* for mu"):
         bare()
+
+
+def test_mistakes_in_laws_of_users_get_one_sentence() -> None:
+    for body, message in table(__file__, "own_mistakes").items():
+        known = {name: getattr(sf, name) for name in ("State", "StaticLaw", "param")}
+        known |= {"ca": ca, "math": math, "smooth": smooth}
+        force = "def force(self, v, N, z=()): return N * smooth.sign(v, 1e-3)"
+        with pytest.raises(ValueError, match=re.escape(message)):
+            exec(f"class Own(StaticLaw):\n    {force}\n    {body}", known)
+            sf.rabinowicz(known["Own"]())
+            sf.rabinowicz(sf.Exact(known["Own"]()))
+
+
+def test_a_force_that_is_constant_or_not_finite_is_found() -> None:
+    for force, topic, pattern in ((3.0, "sign", "drives steady"), (np.nan, "values", "got nan")):
+        remarks = sf.check_law(with_force(lambda s, v, N, force=force: force)).remarks
+        (text,) = (one.text for one in remarks if one.topic == topic)
+        assert search(pattern, text)
 
 
 def test_what_is_not_a_law_with_numbers_is_refused() -> None:

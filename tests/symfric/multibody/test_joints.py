@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from symfric import multibody as mb
-from symfric.model.parts import Symbol
+from symfric.model.sketch import Symbol
 from symfric.multibody.joint import COMPONENTS, Pair, unit
 from symfric.multibody.spatial import (
     euler_e,

@@ -73,6 +73,8 @@ def test_rates_that_cannot_stay_move_to_the_nearest() -> None:
     assert following(J, np.array([1.0, 1.0]), still) == pytest.approx([0.6 * -0.2, 0.8 * 0.2])
     assert following(J, np.array([1.0, 0.0]), still) == pytest.approx([1.0, -4 / 3])
     assert following(np.array([[1.0, 0.0]]), np.array([1.0, 0.0]), still) == pytest.approx([0, 0])
+    fast = np.array([1e3, 0.0])  # a dead centre is one at which the other rate is out of proportion
+    assert following(np.array([[1.0, -0.05]]), fast, still) == pytest.approx([1e3, 2e4])
     assert following(J, np.zeros(2), np.array([0.5])) == pytest.approx([-0.4, -0.3])
     twice = np.array([[0.8, 0.6], [1.6, 1.2]])
     assert following(twice, np.array([0.0, 3.0]), np.zeros(2)) == pytest.approx([-9 / 4, 3.0])

@@ -14,7 +14,7 @@ from symfric.integrator.equations.initial import consistent
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.equations.system import system
 from symfric.model import Model
-from symfric.model.parts import Sketch
+from symfric.model.sketch import Sketch
 from symfric.multibody.joint import COMPONENTS
 from symfric.multibody.results import constraint_units
 from symfric.scenes import MECHANISMS, FourBar, FourMass, Pendulum, SliderCrank

@@ -48,7 +48,7 @@ def test_every_law_brakes_or_is_refused_in_one_sentence() -> None:
         assert np.abs(balance.defect).max() < 1e-6 * balance.scale, name
     assert refused == {
         "viscous", "power_law_viscous", "steady_state_lugre", "rui_wang", "makkar_dixon",
-        "wojewoda", "quarter_car_general", "quarter_car_simple", "bam",
+        "wojewoda", "quarter_car_general", "quarter_car_simple", "bam", "brush_tyre", "lugre_tyre",
     }  # fmt: skip
 
 

@@ -16,7 +16,7 @@ from PIL import Image
 
 from symfric import BrownMcPhee, ExactCoulomb, Model, Trajectory, Variable, rabinowicz, simulate
 from symfric.foundation.numeric import Array
-from symfric.model.parts import Mark, Part, Sketch, Symbol
+from symfric.model.sketch import Mark, Part, Sketch, Symbol
 from symfric.multibody import Distance, Mechanism, PinInSlot, Prismatic, Revolute
 from symfric.multibody.results import SPRING
 from symfric.results.animation import SLIDES, STICKS, frame_times, picture
@@ -295,6 +295,14 @@ def drawn(symbol: Symbol, a: Array, b: Array, **more: object) -> dict[str, Strok
 
 
 A, B = np.zeros(3), np.array([3.0, 0.0, 4.0])
+
+
+def test_a_body_of_micrometres_is_drawn_as_a_line() -> None:
+    axes, at = np.eye(3)[None, :, :, None], 1e-6 * np.stack([A, B])[:, :, None]
+    sketch = Sketch(ca.SX(12, 2), (Part("body", 1, (0,)),), ())
+    view = View(at[0], at[1], np.array([0.0, -1.0, 0.0]), True, 1e-7)
+    roles = [s.role for s in strokes(sketch, Poses(axes, at, A[None, :, None]), view, {})]
+    assert roles == ["path", "body", "centre"]
 
 
 def test_a_spring_runs_from_end_to_end_and_swings_in_the_picture() -> None:

@@ -1,5 +1,6 @@
 """Schematics: legible, complete, and with arrows in the positive directions."""
 
+from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
 
@@ -13,13 +14,30 @@ from symfric import BrownMcPhee, Model, Variable
 from symfric.foundation.variable import starts_of, symbols_of
 from symfric.model.kinds import POSITION
 from symfric.multibody import (
+    BandBrake,
     Belt,
+    Cam,
+    CapstanDrum,
+    Cylindrical,
+    DiscClutch,
+    DrumBrake,
+    Force,
+    Gear,
+    Gravity,
     JointFriction,
     JointSpringDamper,
+    JointStop,
     Mechanism,
+    PrescribedMotion,
+    Prismatic,
     Revolute,
+    Rolling,
+    Screw,
     SpringDamper,
+    UserConstraint,
+    UserForce,
 )
+from symfric.multibody.forces import Part
 from symfric.results.schematic import formula, schematic
 from symfric.scenes import ALL_SCENES, MECHANISMS, DrillString, Drive, FourBar, Rabinowicz
 
@@ -104,6 +122,58 @@ def test_belts_and_springs_of_joints_are_drawn_between_their_joints() -> None:
     marks = {mark.name: mark for mark in m.build().sketch().marks}
     assert (marks["belt"].symbol.line, marks["load"].symbol.line) == ("link", "spiral")
     assert (marks["belt"].a, marks["belt"].b) == (marks["q_1"].b, marks["q_2"].b)
+
+
+ELEMENTS = (
+    Belt("part", "q_1", "q_2", LAW, 50.0, 0.1, 0.2, 3.0),
+    BandBrake("part", "q_1", LAW, 50.0, 0.1, 3.0, 0.3, 0.1),
+    CapstanDrum("part", "rail", LAW, 50.0, 0.1, 3.0, drum="q_1"),
+    DiscClutch("part", "q_1", LAW, 50.0, 0.2, 0.1, b="q_2"),
+    DrumBrake("part", "q_1", LAW, 50.0, 0.1, 0.2, 0.1, 0.05),
+    Cam("part", "q_1", "rail", lambda angle: 0.1 * ca.sin(angle)),
+    Gear("part", "q_1", "q_2", -0.5),
+    JointSpringDamper("part", "q_1", actuator=2.0),
+    JointStop("part", "rail", -1.0, 1.0, 1e3),
+    PrescribedMotion("part", "q_2", lambda t: t**2),
+    Rolling("part", "q_2", "rail", 0.1),
+    Screw("part", "thread", 0.01),
+    SpringDamper("part", "ground.axle_2", "cart", actuator=2.0),
+    UserConstraint("part", lambda kin: kin.along("rail")[0] - kin.along("q_1")[0]),
+    UserForce("part", "cart.hook", lambda _: ((1.0, 0.0, 0.0), (0.0, 0.0, 0.0))),
+)
+
+
+def concrete(kind: type) -> set[type]:
+    return {kind, *(below for one in kind.__subclasses__() for below in concrete(one))}
+
+
+@pytest.mark.parametrize("parts", [ELEMENTS[:5], ELEMENTS[5:10], ELEMENTS[10:]])
+def test_every_element_is_named(parts: tuple[Part, ...]) -> None:
+    m = Mechanism("machine")
+    for k in (1, 2):
+        m.body(f"pulley_{k}", 1.0, (0.01, 0.01, 0.01))
+        m.frame(f"pulley_{k}.axle", z=(0.0, 1.0, 0.0))
+        m.frame(f"ground.axle_{k}", at=(0.5 * k, 0.0, 0.0), z=(0.0, 1.0, 0.0))
+        m.joint(Revolute(f"q_{k}", f"ground.axle_{k}", f"pulley_{k}.axle"))
+    for name, joint in (("cart", Prismatic("rail", "ground", "cart")),
+                        ("nut", Cylindrical("thread", "ground.axle_1", "nut"))):  # fmt: skip
+        m.body(name, 1.0, (0.01, 0.01, 0.01))
+        m.joint(joint)
+    m.frame("cart.hook", at=(0.1, 0.0, 0.0))
+    names = [f"part_{k}" for k in range(len(parts))]
+    for name, part in zip(names, parts, strict=True):
+        (m.force if isinstance(part, Force) else m.constraint)(replace(part, name=name))
+    figure = m.schematic()
+    check_legible(figure)
+    for name in map(formula, names):
+        found = [text for text in texts(figure) if text.startswith(name)]
+        assert found in ([name], [f"{name}: $N$"])
+
+
+def test_no_element_is_missing_above() -> None:
+    every = {kind for kind in concrete(Part) if getattr(kind, "__final__", False)}
+    own = {kind for kind in every if kind.__module__.startswith("symfric.")}
+    assert own == {type(part) for part in ELEMENTS} | {Gravity}
 
 
 @pytest.mark.parametrize(

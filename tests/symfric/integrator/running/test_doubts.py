@@ -187,6 +187,14 @@ def test_steady_friction_of_no_law_adds_energy(name: str) -> None:
         assert not sliding.suspect(model.values("p"))
 
 
+def test_a_bound_of_zero_is_exceeded_by_a_share_of_the_nominal_value() -> None:
+    x = sf.Variable("x", "m", start=1.0, lower=0.0)
+    model = sf.Model("falling", x=(x,), ode=ca.SX(-1.0))
+    assert not sf.simulate(model, 1.0005).doubts
+    with pytest.warns(sf.LimitWarning, match=r"x from t = 1 s, up to -0\.1 m"):
+        sf.simulate(model, 1.1)
+
+
 def test_laws_are_not_inserted_for_friction_that_only_brakes(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -250,6 +258,8 @@ FAILURES: dict[str, Failure] = {
     "square": (
         ode(-X, Y**2), {}, SMALL, 1.0, r".*y = .*grows without bound; check signs and param"
     ),
+    # y is infinite as a double at t = 0.70978, and products of it before
+    "exponential": (ode(-X, 1e3 * Y), {}, SMALL, 0.7, ".*y = .*e.30. grows without bound"),
     "cube": (ode(-X, Y**3), {}, SMALL, 0.5, ".*y = .*grows without bound; check signs and param"),
     "no solution": (
         dae(-Z, Z**2 - (1 - t)), {}, SINGULAR, 1.0,

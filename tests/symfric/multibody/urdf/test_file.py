@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 from robots import SMALL
 
-from symfric.multibody.urdf_file import parse, rotation
+from symfric.multibody.outlines import box, cylinder, sphere
+from symfric.multibody.urdf_file import parse
+from symfric.multibody.urdf_text import rotation
 
 LINK = (
     '<link name="tip"><inertial><mass value="1"/>'
@@ -25,13 +27,12 @@ def small(*more: str) -> str:
 
 
 def test_numbers_of_links_and_joints_are_read() -> None:
-    limit = '<limit lower="-1" upper="2.5" effort="7"/><mimic joint="hinge" multiplier="-2"/>'
-    urdf = parse(small(joint(f'<origin xyz="1 2 3"/>{limit}'), LINK))
+    mimic = '<origin xyz="1 2 3"/><mimic joint="hinge" multiplier="-2"/>'
+    urdf = parse(small(joint(mimic), LINK))
     hinge, wrist = urdf.joints
     assert (hinge.kind, hinge.damping, hinge.friction) == ("revolute", 0.3, 0.2)
     assert (hinge.axis.tolist(), hinge.p.tolist()) == ([0, 1, 0], [0, 0, 1])
     assert (wrist.p.tolist(), wrist.axis.tolist()) == ([1, 2, 3], [1, 0, 0])
-    assert wrist.limits == {"lower": -1.0, "upper": 2.5, "effort": 7.0}
     assert wrist.mimic is not None
     assert (wrist.mimic.joint, wrist.mimic.multiplier, wrist.mimic.offset) == ("hinge", -2.0, 0.0)
     arm = urdf.links["arm"]
@@ -45,6 +46,30 @@ def test_numbers_of_links_and_joints_are_read() -> None:
 
 
 @pytest.mark.parametrize(
+    ("kind", "limit", "limits", "left"),
+    [
+        ("prismatic", 'lower="-1" upper="2.5" effort="7"', (-1.0, 2.5, 7.0, None), ""),
+        ("revolute", 'upper="2"', (0.0, 2.0, None, None), ""),
+        ("revolute", 'lower="1" upper="-1" velocity="3"', (None, None, None, 3.0), "lower, upper"),
+        ("continuous", 'upper="9" velocity="3"', (None, None, None, 3.0), "lower, upper"),
+        ("revolute", 'lower="0" upper="0" effort="0" velocity="-1.0"', (None,) * 4,
+         'effort="0"> of joint \'wrist\' <limit velocity="-1.0"'),
+        ("revolute", 'lower="-1e16" upper="1e16" effort="9"', (None, None, 9.0, None), ""),
+        ("planar", 'effort="9" velocity="2"', (None,) * 4, None),
+        ("fixed", 'lower="-1" upper="2.5" effort="7"', (None,) * 4, ""),
+    ],
+)  # fmt: skip
+def test_limits_apply_where_they_mean_something(
+    kind: str, limit: str, limits: tuple[float | None, ...], left: str | None
+) -> None:
+    urdf = parse(small(joint(f"<limit {limit}/>", kind=kind), LINK))
+    given = zip(("lower", "upper", "effort", "velocity"), limits, strict=True)
+    assert urdf.joints[1].limits == {key: x for key, x in given if x is not None}
+    said = f"<limit{'' if left is None else f' {left}'}> of joint 'wrist'"
+    assert " ".join(urdf.left_out) == ("" if left == "" else said)
+
+
+@pytest.mark.parametrize(
     ("tag", "damping", "friction", "left"),
     [
         ('<dynamics mu_viscous="16" mu_coulomb="0.4"/>', 16.0, 0.4, ""),
@@ -54,6 +79,7 @@ def test_numbers_of_links_and_joints_are_read() -> None:
         ('<dynamics damping="0" mu_viscous="16"/>', 0.0, 0.0, "mu_viscous"),
         ('<dynamics D="1" damping="0.1" friction="0" mu_coulomb="0"/>', 0.1, 0.0, "D"),
         ("<dynamics/>", 0.0, 0.0, ""),
+        ('<dynamics Damping="1" frictionloss="0.2" armature="1"/>', 1.0, 0.2, "armature"),
     ],
 )  # fmt: skip
 def test_friction_of_any_dialect(tag: str, damping: float, friction: float, left: str) -> None:
@@ -88,6 +114,27 @@ def test_appearance_is_passed_over_and_everything_else_is_named() -> None:
     ]
 
 
+def test_solids_are_read_in_all_dialects_and_bad_ones_are_no_mistakes() -> None:
+    solids = (
+        '<box size="1 2 3"/>', '<drake:capsule radius="1" length="2"/>', '<sphere radius="2"/>',
+        '<mesh filename="a.stl"/>', '<box size="1 2"/>', '<cylinder length="1"/>',
+    )  # fmt: skip
+    shapes = "".join(f"<visual><geometry>{solid}</geometry></visual>" for solid in solids)
+    turned = '<visual><origin rpy="0 90 0"/></visual>'
+    text = small(joint(), LINK.replace("<inertial>", f"{shapes}{turned}<inertial>"))
+    urdf = parse("\ufeff" + text)
+    where = "link 'tip' > visual"
+    assert urdf.doubts == (
+        f"{where}: expected 3 numbers in size, got '1 2'",
+        f"{where} > origin: expected rpy in radians, got 0, 90, 0",
+    )
+    assert urdf.left_out == tuple(f"<{tag}> of link 'tip'" for tag in ("mesh", "box", "cylinder"))
+    corners, found = box(1.0, 2.0, 3.0), urdf.outlines["tip"]
+    assert np.array_equal(found[: len(corners)], corners, equal_nan=True)
+    assert len(found) == len(corners) + len(cylinder(1.0, 2.0)) + len(sphere(2.0))
+    assert np.nanmax(np.linalg.norm(found[-len(sphere(2.0)) :], axis=1)) == pytest.approx(2.0)
+
+
 BAD = [
     ("<robot", r"^urdf: expected XML, got unclosed token: line 1, column 0"),
     ("<sdf/>", r"^urdf: expected <robot> as its outermost tag, got <sdf>"),
@@ -112,6 +159,7 @@ BAD = [
      r"joint 'wrist' > origin: expected 3 numbers in rpy, got '0 0 nan'"),
     (small(LINK, joint('<dynamics damping="-1"/>')),
      r"joint 'wrist' > dynamics > damping: expected >= 0, got -1"),
+    (small(LINK, joint(), "<Link/>"), "<Link>: expected <link>, in lower case"),
     (small(LINK, joint('<limit lower="low"/>')),
      r"joint 'wrist' > limit: expected a number in lower, got 'low'"),
     (small(LINK, joint('<mimic joint="wrist"/>')), r"joint 'wrist' > mimic: .* got 'wrist'"),

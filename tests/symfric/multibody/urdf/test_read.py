@@ -1,6 +1,7 @@
 """Mechanisms from URDF files against closed forms, and what the file says."""
 
 import warnings
+from itertools import product
 from math import pi
 
 import casadi as ca
@@ -9,11 +10,13 @@ import pytest
 from robots import SMALL, rod
 from scipy.optimize import brentq
 
-from symfric import Coulomb, LuGre, Sum, Viscous, parameters, simulate
+from symfric import Coulomb, LimitWarning, LuGre, Sum, Viscous, parameters, simulate
 from symfric.laws import Stribeck
 from symfric.multibody import JointFriction, Mechanism, Universal, functions
+from symfric.multibody.outlines import sphere
 from symfric.multibody.urdf import holding, read_urdf, relative, tag_friction  # fmt: skip
 from symfric.multibody.urdf_file import parse
+from symfric.results.strokes import Poses, look, outlines, strokes
 
 
 def test_damping_is_viscous_and_friction_a_constant_torque_without_any_unknown() -> None:
@@ -147,17 +150,71 @@ def test_mimic_joint_follows_and_its_mass_is_felt() -> None:
 
 
 def test_all_that_is_left_out_is_reported_once() -> None:
-    more = '<limit lower="-1" upper="1"/><safety_controller k_velocity="1"/></joint><gazebo/>'
-    visual = '<visual><geometry><sphere radius="1"/></geometry></visual></link>'
+    more = '<limit effort="0"/><safety_controller k_velocity="1"/></joint><gazebo/>'
+    solids = '<sphere radius="1"/></geometry></visual><visual><geometry><mesh filename="a.stl"/>'
+    visual = f"<visual><geometry>{solids}</geometry></visual></link>"
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         read_urdf(rod(**{"</joint>": more, "</inertial></link>": f"</inertial>{visual}"}))
     (message,) = (str(w.message) for w in caught)
-    expected = "<safety_controller> of joint 'hinge', <limit> of joint 'hinge', <gazebo>"
-    assert message == f"urdf 'small': left out: {expected}"
+    expected = "<mesh> of link 'arm', <safety_controller> of joint 'hinge'"
+    limit = "<limit effort=\"0\"> of joint 'hinge'"
+    assert message == f"urdf 'small': left out: {expected}, {limit}, <gazebo>"
 
 
-@pytest.mark.filterwarnings("ignore:urdf 'small'. left out. <limit effort, velocity>")
+def test_limits_of_the_file_bound_the_model_and_a_run_names_those_it_exceeds() -> None:
+    text = rod(**{"</joint>": '<limit lower="-1" upper="2" effort="9" velocity="3"/></joint>'})
+    m = read_urdf(text)
+    model = m.build()
+    found = {v.name: (v.lower, v.upper) for v in (*model.x, *model.u)}
+    assert found == {"hinge": (-1.0, 2.0), "hinge_rate": (-3.0, 3.0), "tau_hinge": (-9.0, 9.0)}
+    simulate(model, 0.05, x0={"hinge": 0.1}, u={"tau_hinge": 9.0})
+    message = r"hinge_rate from t = 0\.\d+ s, up to .* rad/s \(-3 ... 3\); tau_hinge from t = 0 s"
+    with pytest.warns(LimitWarning, match=f"'small': Bounds are exceeded: {message}"):
+        run = simulate(model, 0.2, x0={"hinge": 0.1}, u={"tau_hinge": 20.0})
+    first = float(run.doubts.partition("t = ")[2].split()[0])
+    assert abs(run.at(np.array([first]))["hinge_rate"][0]) == pytest.approx(3.0, rel=0.1)
+    stopped = read_urdf(text, stop_stiffness=500.0)
+    assert sorted(stopped.limits) == ["hinge_rate", "tau_hinge"]
+    m.limit("hing", 0.0, 1.0)
+    with pytest.raises(ValueError, match=r"'small' > limit: .* got hing"):
+        m.build()
+
+
+def test_solids_of_the_file_are_drawn_where_its_links_are() -> None:
+    """Corners of a turned box on the arm by hand; the ground has a cylinder."""
+    solid = '<visual><origin xyz="{}" rpy="{}"/><geometry><{}/></geometry></visual></link>'
+    bars = solid.format("0 0 -0.5", f"0 0 {pi / 2}", 'box size="0.2 0.4 1"')
+    base = solid.format("0 0 0", "0 0 0", 'cylinder radius="0.3" length="2"')
+    world = f'<link name="world">{base}'
+    links = {"</inertial></link>": f"</inertial>{bars}", '<link name="world"/>': world}
+    m = read_urdf(rod(**links))
+    model = m.build()
+    sketch, angle = model.sketch(), 0.3
+    places = ca.Function("places", [model.vector("x")], [sketch.places])([angle, 0.0]).full()
+    axes, at = places[:9].T.reshape(-1, 3, 3, 1), places[9:].T[:, :, None]
+    poses = Poses(axes, at, at[[part.centre for part in sketch.parts]])
+    ground, arm = sketch.parts
+    (found,) = outlines(arm, poses)
+    half = np.array([0.2, 0.1, 0.5]) * np.array([*product((-1, 1), repeat=3)]) + [0.0, 0.0, -0.5]
+    c, s = np.cos(angle), np.sin(angle)
+    turn = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
+    expected = half @ turn.T + [0.0, 0.0, 1.0]
+    corners = np.unique(found[np.isfinite(found[:, 0, 0]), :, 0].round(12), axis=0)
+    assert corners == pytest.approx(np.unique(expected.round(12), axis=0), abs=1e-11)
+    (found,) = outlines(ground, poses)
+    rim = found[np.isfinite(found[:, 0, 0]), :, 0]
+    assert np.hypot(rim[:, 0], rim[:, 1]) == pytest.approx(0.3)
+    assert set(rim[:, 2].round(12)) == {-1.0, 1.0}
+    view = look(sketch, poses)
+    roles = [(s.role, s.body) for s in strokes(sketch, poses, view, {})]
+    assert roles.count(("outline", -1)) == roles.count(("outline", 0)) == 1
+    assert ("body", 0) not in roles
+    assert (view.low <= expected.min(axis=0)).all()
+    assert np.linalg.norm(sphere(0.7)[:25], axis=1) == pytest.approx(0.7)
+    assert m.schematic().get_figwidth() > 0
+
+
 def test_joints_stop_at_the_limits_of_the_file_on_request() -> None:
     """At rest on a stop, the weight and the spring of the stop balance."""
     old, limit = "</joint>", '<limit upper="-0.25" lower="-2" effort="9"/></joint>'

@@ -1,0 +1,238 @@
+"""Operations of fixed-point C, and the graph of a function in these operations.
+
+A function that saturates (exp, tanh) gets a clamped argument. If its argument follows from a single
+input, a copy of the input is clamped where the function has its limit, so that fewer bits of all
+values in between hold the range, and more hold the fraction.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from math import exp, frexp
+from typing import final
+
+import casadi as ca
+import numpy as np
+
+from symfric.codegen.fixed.operations import (
+    ALIGN,
+    CLAMP,
+    DECAY,
+    INEXACT,
+    LIMITS,
+    OPERATIONS,
+    PHI1,
+    PHI2,
+    SCALE,
+)
+from symfric.emitter.c99 import operation_name
+from symfric.emitter.logic import BOOLEAN, settled
+from symfric.foundation.graph import LEAVES, SELECT, Graph, Node, graph, pruned, rebuild
+from symfric.foundation.numeric import NEAR, exp_phi1_phi2
+
+Hull = tuple[float, float]
+
+
+@final
+@dataclass
+class _Builder:
+    """Unique nodes."""
+
+    nodes: list[Node] = field(default_factory=list[Node])
+    known: dict[Node, int] = field(default_factory=dict[Node, int])
+
+    def keep(self, node: Node) -> int:
+        place = self.known.setdefault(node, len(self.nodes))
+        if place == len(self.nodes):
+            self.nodes.append(node)
+        return place
+
+    def add(self, op: int, *args: int, value: float = 0.0) -> int:
+        return self.keep(Node(op, args, value=value))
+
+    def number(self, value: float) -> int:
+        return self.keep(Node(ca.OP_CONST, value=value))
+
+    def value(self, i: int) -> float | None:
+        node = self.nodes[i]
+        return node.value if node.op == ca.OP_CONST else None
+
+    def product(self, a: int, b: int) -> int:
+        """Return a b; powers of two cost nothing, and factors are collected."""
+        k, other = (self.value(a), b) if self.value(a) is not None else (self.value(b), a)
+        if k is None:
+            return self.power(a, b) or self.add(ca.OP_MUL, a, b)
+        if (c := self.value(other)) is not None:
+            return self.number(k * c)
+        inner = self.nodes[other]
+        if inner.op == ca.OP_MUL and (c := self.value(inner.args[0])) is not None:
+            return self.product(self.number(k * c), inner.args[1])
+        if inner.op == SCALE:
+            return self.product(self.number(k * inner.value), inner.args[0])
+        if abs(frexp(k)[0]) == 0.5:
+            scaled = other if abs(k) == 1.0 else self.add(SCALE, other, value=abs(k))
+            return scaled if k > 0 else self.add(ca.OP_NEG, scaled)
+        return self.number(0.0) if k == 0.0 else self.add(ca.OP_MUL, self.number(k), other)
+
+    def power(self, a: int, b: int) -> int | None:
+        """Return |x|^n for the smooth power x^2 (x^2 + c)^(n/2 - 1), which differs by c^(n/2)."""
+        square, smooth = self.nodes[a], self.nodes[b]
+        if square.op != ca.OP_MUL or smooth.op != ca.OP_CONSTPOW or not -1.0 < smooth.value < 0.0:
+            return None
+        total = self.nodes[smooth.args[0]]
+        if total.op != ca.OP_ADD or a not in total.args or square.args[0] != square.args[1]:
+            return None
+        c = self.value(total.args[0]) or self.value(total.args[1]) or -1.0
+        size, half = self.add(ca.OP_FABS, square.args[0]), 1.0 + smooth.value
+        power = size if half == 0.5 else self.add(ca.OP_CONSTPOW, size, value=2.0 * half)
+        return self.add(INEXACT, power, value=c**half) if c > 0.0 else None
+
+    def quotient(self, a: int, b: int) -> int:
+        """Return a / b; a product as divisor is divided by in turn, as its range is wide."""
+        divisor = self.value(b)
+        if divisor is not None:
+            return self.product(a, self.number(1.0 / divisor))
+        node = self.nodes[b]
+        if node.op == ca.OP_MUL:
+            first, second = node.args
+            return self.quotient(self.quotient(a, first), second)
+        if node.op == SCALE:
+            return self.product(self.number(1.0 / node.value), self.quotient(a, node.args[0]))
+        factor = self.nodes[a]
+        if factor.op == ca.OP_MUL and self.value(factor.args[0]) is not None:
+            return self.product(factor.args[0], self.quotient(factor.args[1], b))
+        return self.add(ca.OP_DIV, a, b)
+
+    def select(self, condition: int, yes: int, no: int) -> int:
+        """Return a select, whose sides get its format."""
+        return self.add(SELECT, condition, self.add(ALIGN, yes), self.add(ALIGN, no))
+
+    def made(self, node: Node, args: Sequence[int]) -> int:
+        """Return the number of a node with the value of `node`."""
+        match node.op:
+            case ca.OP_SQ:
+                return self.product(args[0], args[0])
+            case ca.OP_TWICE:
+                return self.product(self.number(2.0), args[0])
+            case ca.OP_MUL:
+                return self.product(*args)
+            case ca.OP_DIV:
+                return self.quotient(*args)
+            case ca.OP_INV:
+                return self.quotient(self.number(1.0), args[0])
+            case ca.OP_NEG if self.value(args[0]) is not None:
+                return self.number(-self.nodes[args[0]].value)
+            case ca.OP_EXPM1:
+                return self.add(ca.OP_SUB, self.add(ca.OP_EXP, *args), self.number(1.0))
+            case ca.OP_SIGN:
+                zero, (x,) = self.number(0.0), args
+                low = self.select(self.add(ca.OP_LT, x, zero), self.number(-1.0), zero)
+                return self.select(self.add(ca.OP_LT, zero, x), self.number(1.0), low)
+            case ca.OP_IF_ELSE_ZERO:
+                return self.select(args[0], args[1], self.number(0.0))
+            case _ if node.op == SELECT:
+                return self.select(*args)
+            case ca.OP_CONSTPOW:
+                return self.add(node.op, args[0], value=self.nodes[args[1]].value)
+            case _:
+                return self.keep(Node(node.op, tuple(args), node.entry, node.value))
+
+
+POINTS = 2000
+"""Number of points at which a select is compared with functions."""
+
+
+def recognised(function: ca.Function, ranges: Mapping[tuple[int, int], Hull]) -> Graph:
+    """Return the graph of a function with the weights of an exponential step as operations.
+
+    `exp_phi1_phi2` selects a series or a quotient by |x| < `NEAR`. A select by such a condition is
+    recognised by its values at random points in the ranges of the inputs, of all orders of
+    magnitude, and becomes the function of -|x| that it equals at all of them.
+    """
+    source, random = graph(function), np.random.default_rng(0)
+    every = Graph(source.nodes, (tuple(range(len(source.nodes))),))
+    arguments = [ca.SX.sym("x", function.size1_in(k)) for k in range(function.n_in())]
+    values = ca.Function("values", arguments, rebuild(every, arguments, {}))
+    points = [np.zeros((function.size1_in(k), POINTS)) for k in range(function.n_in())]
+    for (k, row), (low, high) in ranges.items():
+        orders = 2.0 ** random.uniform(-20.0, 0.0, POINTS) * np.where(
+            random.random(POINTS) < 0.5, low, high
+        )
+        points[k][row] = np.clip(orders, low, high)
+    found, nodes = np.array(values(*points)), list(source.nodes)
+    for i, node in enumerate(source.nodes):
+        condition = source.nodes[node.args[0]] if node.op == SELECT else node
+        if condition.op != ca.OP_LT or source.nodes[condition.args[1]].value != NEAR:
+            continue
+        size, yes = condition.args[0], found[node.args[0]] != 0.0
+        for op, own in zip((DECAY, PHI1, PHI2), exp_phi1_phi2(-ca.SX(found[size])), strict=True):
+            alike = np.isclose(found[i], ca.evalf(own).full().ravel(), rtol=1e-9, atol=1e-9)
+            if alike.all() and min(yes.sum(), (~yes).sum()) > 10:
+                nodes[i] = Node(op, (size,))
+    return Graph(tuple(nodes), source.results)
+
+
+def lowered(source: Graph, limits: Sequence[float], where: str) -> Graph:
+    """Return the graph of a step in the operations of fixed point.
+
+    Args:
+        source: graph of a step, whose first result is the states.
+        limits: largest magnitude of each state, to which its result is clamped.
+        where: beginning of messages.
+
+    Raises:
+        ValueError: operations without counterpart in fixed point; the message names them all.
+    """
+    build, found = _Builder(), list[int]()
+    source = settled(source)
+    for node in source.nodes:
+        found.append(build.made(node, [found[i] for i in node.args]))
+    states, *outputs = source.results
+    ends = [build.add(CLAMP, found[i], value=x) for i, x in zip(states, limits, strict=True)]
+    rows = [ends, *([found[i] for i in row] for row in outputs)]
+    rows = [tuple(build.add(ALIGN, i) for i in row) for row in rows]
+    result = pruned(build.nodes, rows)
+    wrong = {n.op for n in result.nodes} - {*OPERATIONS, *BOOLEAN, SELECT, *LEAVES}
+    if wrong:
+        got = ", ".join(sorted(map(operation_name, wrong)))
+        raise ValueError(f"{where}: expected operations that fixed point has, got {got}")
+    return result
+
+
+Cone = tuple[tuple[int, int], float]
+"""(argument, row) of an input, and its largest magnitude that matters."""
+
+
+def narrowed(source: Graph, hulls: Sequence[Hull], cones: Mapping[int, Cone]) -> Graph:
+    """Return the graph with clamped arguments of functions that saturate.
+
+    Args:
+        source: a lowered graph.
+        hulls: range of each of its nodes.
+        cones: function -> the input from which alone its argument follows, and the magnitude of it
+            beyond which the function has its limit.
+    """
+    build = _Builder()
+
+    @cache
+    def made(i: int, cone: Cone | None) -> int:
+        node = source.nodes[i]
+        if node.op == ca.OP_INPUT and cone is not None and cone[0] == node.entry:
+            return build.add(CLAMP, build.keep(node), value=cone[1])
+        args = tuple(made(j, cone or cones.get(i)) for j in node.args)
+        if node.op in LIMITS:
+            return saturating(node.op, args[0], *hulls[node.args[0]])
+        return build.keep(Node(node.op, args, node.entry, node.value))
+
+    def saturating(op: int, x: int, low: float, high: float) -> int:
+        limit, shift = LIMITS[op], 0.0
+        if op == ca.OP_EXP and high > 0.0:  # exp(x) = exp(high) exp(x - high)
+            shift = high
+            x = build.add(ca.OP_SUB, x, build.number(high))
+        if max(abs(low - shift), abs(high - shift)) > limit:
+            x = build.add(CLAMP, x, value=limit)
+        found = build.add(op, x)
+        return build.product(build.number(exp(shift)), found) if shift else found
+
+    rows = [tuple(made(i, None) for i in row) for row in source.results]
+    return pruned(build.nodes, rows)
