@@ -8,6 +8,8 @@ from symfric.results.signals import integrals
 from symfric.results.trajectory import Trajectory
 
 ENDS = ("power_a", "power_b")
+CLOSE = 1e-6
+"""Relative difference of energies received and delivered up to which an element is one piece."""
 REST = 1e-9
 """Largest sliding distance [m] of an element at rest."""
 
@@ -19,7 +21,8 @@ def efficiency(run: Trajectory, element: str) -> float:
 
     with the powers P = `<element>_power_a`, `<element>_power_b` [W] of the element on both coupled
     joints, by quadrature over the dense output. Between 0 and 1: the difference to 1 is lost in
-    friction. NaN if the element slid by less than 1 nm: rest has no efficiency.
+    friction. If the element slid by less than 1 nm, the efficiency is 1 if it moved as one piece,
+    such as a clutch that sticks, and NaN at rest.
 
     Args:
         run: result of a simulation of a mechanism.
@@ -43,4 +46,6 @@ def efficiency(run: Trajectory, element: str) -> float:
     speed = smooth.magnitude(run.model.expression(f"{element}_slip"), 0.0)
     whole = ca.vertcat(delivered, received, speed)
     out, into, path = integrals(run.step_times, run.of, whole, run.step_times[-1:])[:, 0]
-    return float(out / into) if path > REST else float("nan")
+    if path > REST:
+        return float(out / into)
+    return 1.0 if abs(out - into) < CLOSE * into else float("nan")

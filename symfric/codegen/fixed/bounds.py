@@ -37,8 +37,8 @@ from symfric.emitter.branches import Placed
 from symfric.emitter.logic import COMPARISONS, logical
 from symfric.foundation.graph import SELECT
 
-MOST = 6000
-"""Largest number of boxes."""
+MOST = 500_000
+"""Largest number of values, in all boxes."""
 GAIN, PATIENCE = 0.01, 12
 """Relative fall of the bound that counts, and number of halvings without one before the end."""
 TRIES = 6
@@ -84,14 +84,17 @@ def analysed(found: Placed, ranges: Mapping[Entry, Hull]) -> Bounds:
     while idle < PATIENCE:
         level = np.minimum(best.errors, np.finfo(float).max)[:, None]
         split: Mask = np.any(best.by_box >= np.maximum(0.5 * level, np.finfo(float).tiny), axis=0)
-        if not split.any() or best.boxes.shape[2] + split.sum() > MOST:
+        count = len(over.nodes) * (best.boxes.shape[2] + split.sum())
+        if not split.any() or count > MOST:
             break
         boxes = np.concatenate([best.boxes[..., ~split], over.halved(best, split)], axis=2)
         new = over.bounds(boxes)
         gain = (new.errors < (1.0 - GAIN) * best.errors).any()
         best, idle = new, 0 if gain else idle + 1
     if not np.isfinite(best.errors).all():
-        raise ArithmeticError("a value that is not bounded, such as a quotient near a zero divisor")
+        raise ArithmeticError(
+            "a quotient near a zero divisor, or an error above an eighth of the largest value"
+        )
     return best
 
 

@@ -174,6 +174,10 @@ def _ranges(block: Block, given: Mapping[str, Hull]) -> dict[str, Hull]:
     return found
 
 
+COARSEST = 0.1
+"""Largest error of an output, relative to its largest value."""
+
+
 def _analysed(block: Block, ranges: Mapping[tuple[int, int], Hull]) -> tuple[Bounds, IntegerWriter]:
     """Return formats and bounds of a step, and the writer of its statements."""
     where = f"fixed point '{block.name}'"
@@ -186,8 +190,20 @@ def _analysed(block: Block, ranges: Mapping[tuple[int, int], Hull]) -> tuple[Bou
     except ArithmeticError as error:
         raise ValueError(
             f"{where}: expected values that are bounded over the ranges, got {error}; narrow the "
-            "ranges"
+            "ranges, and let loads that divide stay above 0"
         ) from error
+    states, middles = len(block.states), found.boxes.mean(axis=1).T
+    u, x = np.split(middles, [len(block.inputs)], axis=1)
+    largest = np.abs(evaluated(block.step, x, np.zeros((len(x), 0)), u)).max(axis=0)
+    for name, most, size in zip(
+        block.outputs, found.errors[states:], largest[states:], strict=True
+    ):
+        if most > COARSEST * size:
+            raise ValueError(
+                f"{where}: expected an error of {name} below a tenth of its largest value, got "
+                f"{most:.2g} {block.outputs[name].unit}; narrow the ranges, or choose a law "
+                "without jumps"
+            )
     return found, IntegerWriter(whole, found.formats, f"{block.name}_{INTEGER.suffix}")
 
 

@@ -309,6 +309,7 @@ def prepare(folder: Path) -> None:
         "long.csv": "t [s],force [N]\n0,1,5\n1,2,5\n",
         "broken.py": "a = 1\nb = a / 0\n",
         "syntax.py": "a = (\n",
+        "exits.py": "raise SystemExit(3)\n",
         "laws.py": "from symfric import StaticLaw\nclass Branch(StaticLaw):\n"
         "    def force(self, v, N, z=()): return N if v > 0 else -N\nnumber = 3\n",
         "robot.urdf": SMALL,

@@ -162,6 +162,8 @@ WRONG = [
     (lambda out: fixed_point(Stribeck(), out, {"v": (1, nan), "N": (3, 2)}), "v: .*; N: expected"),
     (lambda out: fixed_point(ALL_LAWS["mixed_lubrication"](), out, {"v": (-1, 1), "N": (0, 9)}),
      "bounded over the ranges, got .*; narrow the ranges"),
+    (lambda out: fixed_point(ALL_LAWS["karnopp"](), out, RANGES | {"F_e": (-5, 5)}),
+     "error of F below a tenth of its largest value, got .* N; .* without jumps"),
     (lambda out: fixed_point(ALL_LAWS["quarter_car_general"](), out, RANGES),
      "range of x_rel"),
 ]  # fmt: skip

@@ -236,6 +236,16 @@ def test_a_shoe_above_its_limit_locks_itself() -> None:
     assert near["w_locking"][0] == pytest.approx(0.999, rel=1e-9)
 
 
+@pytest.mark.parametrize(("torque", "expected"), [(1.0, 1.0), (0.0, np.nan)])
+def test_a_clutch_that_sticks_loses_nothing_and_rest_has_no_efficiency(
+    torque: float, expected: float
+) -> None:
+    m = turning(mb.DiscClutch("w", "a", sf.ExactCoulomb(), 1e4, 0.2, 0.1, "b"), 0.0, 0.0)
+    m.force(mb.JointSpringDamper("motor", "a", actuator=torque))
+    run = simulate(m.build(), 1.0)
+    assert mb.efficiency(run, "w") == pytest.approx(expected, abs=1e-9, nan_ok=True)
+
+
 @pytest.mark.parametrize("law", ["exact_coulomb", "brown_mcphee", "lugre_normalised"])
 def test_a_released_element_has_no_friction_and_never_pulls(law: str) -> None:
     def wave(t: ca.SX) -> ca.SX:
