@@ -218,13 +218,15 @@ class Model(Showing, System):
         """Names of the angles [rad] of which a whole turn changes no equation and no event."""
         symbols = self._symbols()
         f = ca.Function("rows", [symbols], [self._rows])
-        points = np.random.default_rng(0).uniform(0.1, 1.0, (symbols.numel(), 3))
+        points = np.random.default_rng(0).uniform(0.1, 1.0, (symbols.numel(), 8))
+        rows = {v.name: k for k, v in enumerate(self.x, 1 + self.xdot.numel()) if v.unit == "rad"}
+        points[[*rows.values()]] *= 100  # beyond the stops of several turns
         first, found = f(points).full(), list[str]()
-        for row, v in enumerate(self.x, 1 + self.xdot.numel()):
-            if v.unit == "rad" and v.name not in self.cyclic:
-                turned = points + 2 * np.pi * (np.arange(len(points)) == row)[:, None]
-                if np.abs(f(turned).full() - first).max() <= 1e-9 * np.abs(first).max():
-                    found.append(v.name)
+        for name, row in rows.items():
+            turned = points + 2 * np.pi * (np.arange(len(points)) == row)[:, None]
+            same = np.abs(f(turned).full() - first).max() <= 1e-9 * np.abs(first).max()
+            if same and name not in self.cyclic:
+                found.append(name)
         return tuple(found)
 
     @property

@@ -29,7 +29,7 @@ RANK = 1e-9
 """Fraction of the largest singular value below which singular values count as zero."""
 SINGULAR = 1e-12
 """Value below which eigenvalues of a mass matrix with unit diagonal count as zero."""
-LONG, LONG_WITH_FRICTION = 16, 12
+LONG, LONG_WITH_FRICTION = 16, 10
 """Number of links of a chain from which cuts save operations.
 
 The second number is for friction from reactions, which makes dense derivatives more expensive.

@@ -247,3 +247,18 @@ def test_a_bristle_under_a_load_that_varies_starts_at_its_steady_state() -> None
         assert many["x"][0, -1] == pytest.approx(run.final["x"], rel=1e-7)
         slope = (many["x"][1, -1] - many["x"][0, -1]) / 0.1
         assert run.sensitivities["x0.v"]["x"][-1] == pytest.approx(slope, rel=1e-4)
+
+
+@pytest.mark.parametrize(("limit", "angles"), [(None, ("phi",)), (3.0, ()), (30.0, ())])
+def test_angles_are_those_whose_turns_change_nothing(
+    limit: float | None, angles: tuple[str, ...]
+) -> None:
+    """A stop at 30 rad ends the turns; `way` is cyclic, and an angle with a spring is neither."""
+    phi, w = sf.Variable("phi", "rad"), sf.Variable("w", "rad/s")
+    twist, way = sf.Variable("twist", "rad"), sf.Variable("way", "m")
+    stop = 0.0 if limit is None else 100 * ca.fmax(phi - limit, 0)
+    rates = ca.vertcat(w, -ca.sin(phi) - stop, -twist, w)
+    model = sf.Model("m", x=(phi, w, twist, way), ode=rates)
+    assert model.angles == angles and model.cyclic == ("way",)
+    bump = sf.Event("bump", phi + way - 1.0)
+    assert sf.Model("m", x=(phi, w, twist, way), ode=rates, events=(bump,)).cyclic == ()
