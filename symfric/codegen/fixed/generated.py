@@ -233,9 +233,9 @@ def _settled(block: Block, found: Bounds) -> list[str]:
     for share in SLOWEST:
         total = float(errors[least >= 0.5 * share * most].max(initial=0.0))
         sentences.append(
-            f"While |{first.name}| >= {share * most:g} {first.unit}, the errors of all steps add up "
-            f"to {_above(total)} {state.unit} of {state.name}: an estimate, with the contraction of "
-            "a step at the corners of the ranges."
+            f"While |{first.name}| >= {share * most:g} {first.unit}, the errors of all steps add "
+            f"up to {_above(total)} {state.unit} of {state.name}. This is an estimate: the "
+            "contraction of a step is taken at the corners of the ranges."
         )
     return sentences
 
