@@ -350,6 +350,7 @@ def _around(into: Transcription, begin: Values, spread: float, seed: int) -> Val
                     row += sizes[v.name] * (np.sin(at) / HALF_WAVES) @ waves[v.name]
                 else:
                     row += sizes[name] * pi / whole * np.cos(at) @ waves[name]
+                row[:] = np.clip(row, *span.boxes[v.name])
         at = angles((mesh[1:] + mesh[:-1]) / 2)
         for row, v in zip(u, span.model.u, strict=True):
             low, high = span.boxes[v.name]

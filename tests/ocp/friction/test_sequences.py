@@ -17,7 +17,7 @@ from ocp.friction.mode_optimisation import KICK, SHORTEST, better, settled
 from ocp.friction.sequence import Leg, ModeInterval, Track
 from ocp.friction.smooth_models import smoothed, widths
 from ocp.friction.transfer import Known, Reader
-from ocp.problems import cart_pendulum, load_through_spring, out_and_back
+from ocp.problems import cart_pendulum, goddard, load_through_spring, out_and_back
 from ocp.solving.methods import Ipopt
 from ocp.solving.one_solve import Task, starts_around
 from ocp.solving.starts import initial_points
@@ -214,6 +214,14 @@ def test_other_starts_differ_and_rates_belong_to_positions() -> None:
     t = 2.0 * into.meshes[0]
     for position, rate in zip(again.nodes[:2], again.nodes[2:], strict=True):
         assert rate[5:-5] == pytest.approx(np.gradient(position, t)[5:-5], abs=1e-3)
+
+
+def test_random_starts_stay_within_the_bounds_of_states() -> None:
+    """Below the ground the density of the air, exp(500 (1 - h)), reaches 1e52."""
+    into = on(goddard(), 20)
+    for start in starts_around(into, initial_points(into), range(1, 6)):
+        for rows in (start.spans[0].nodes, start.spans[0].inner):
+            assert rows[0].min() >= 1.0 and rows[2].min() >= 0.6 and rows[2].max() <= 1.0
 
 
 def test_ends_stay_phases_join_and_resting_states_take_the_size_of_their_unit() -> None:

@@ -29,7 +29,7 @@ SHOWN_WITH = {
     "dwell": {"T"},
     "velocity_step": {"L"},
 }
-OTHER_INPUTS = {"quarter_car_general", "bam"}
+OTHER_INPUTS = {"quarter_car_general", "bam", "brush_tyre", "lugre_tyre"}
 """Laws that need more than a pushed block offers."""
 
 
@@ -41,7 +41,8 @@ LED = {"coulomb", "karnopp", "dahl", *OTHER_INPUTS, "wojewoda"}
 def shows(law: str, name: str) -> bool:
     if name in NEEDS:
         return law in NEEDS[name]
-    if name in ("drift", "break_away", "stiction") and law in OTHER_INPUTS | {"wojewoda"}:
+    pushed = name in ("drift", "break_away", "stiction")
+    if law in OTHER_INPUTS or (law == "wojewoda" and pushed):
         return False
     return bool(SHOWN_WITH[name] & set(phenomena(sf.law_from_text(law))))
 
