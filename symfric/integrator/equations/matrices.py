@@ -74,8 +74,8 @@ class SymbolicLU(NamedTuple):
                 eliminate, whose rows and columns are the same. All pivots by default.
         """
         pivots = self.eliminations[:leading]
-        rows, columns = (np.argsort(np.argsort([p[i] for p in pivots])) for i in (0, 1))
-        sign = ca.SX(round(np.linalg.det(np.eye(len(pivots))[rows][:, columns])))
+        rows, columns = (np.argsort([pivot[i] for pivot in pivots]).tolist() for i in (0, 1))
+        sign = ca.SX(_parity(rows) * _parity(columns))
         for pivot in pivots:
             sign = times(sign, ca.SX.unary(ca.OP_SIGN, self.symbols[pivot.at]))
         return sign
@@ -107,6 +107,17 @@ class SymbolicLU(NamedTuple):
     def inserted(self, *expressions: ca.SX) -> list[ca.SX]:
         """Return expressions of the factors with `packed` inserted for the symbols."""
         return ca.substitute(list(expressions), [self.symbols], [self.packed])
+
+
+def _parity(order: Sequence[int]) -> int:
+    """Return the sign of a permutation of 0, 1, ..., from the number of its cycles."""
+    left, parity = set(range(len(order))), 1
+    while left:
+        k = left.pop()
+        while (k := order[k]) in left:
+            left.remove(k)
+            parity = -parity
+    return parity
 
 
 def factorise(matrix: ca.SX, groups: Sequence[Sequence[int]] = (), order: Order = ()) -> SymbolicLU:
