@@ -56,9 +56,9 @@ def driven(
         gear_loss      F_m v - phi v [W], >= 0 where |F_m| is not rounded
         copper_loss    i^2 resistance [W]; i^2 [A^2] without a resistance
 
-    The input `current` has the bounds +-`current_limit` of the drive, which optimal control obeys:
-    integral(lambda s: s.copper_loss) is its cost. Drives of several joints are added one by one,
-    each with a name.
+    With limit="bounds", the input `current` has the bounds +-`current_limit` of the drive, which
+    optimal control obeys: integral(lambda s: s.copper_loss) is its cost. Drives of several joints
+    are added one by one, each with a name.
 
     The energy balance of a mechanism has the work of the motor as that of the actuator, and the
     losses of the gear as "gear"; the kinetic energy includes the rotor.
@@ -68,8 +68,9 @@ def driven(
         drive: the drive, rotary for a torque and linear for a force.
         input: input that is the force of the drive; by default the only input.
         name: prefix of the new names, such as "elbow" for elbow_current.
-        limit: "saturate" clips the current at its limit, for simulation; "bounds" only gives the
-            input its bounds, for optimal control, which needs derivatives at the limit.
+        limit: "saturate" clips the current at its limit, for simulation, and accepts any input;
+            "bounds" only gives the input its bounds, for optimal control, which needs derivatives
+            at the limit.
         free: parameters of the drive that become parameters of the model.
 
     Raises:
@@ -91,9 +92,10 @@ def driven(
     drive, p = symbolise(drive, *free)
     most = drive.current_limit
     mark = f"{name}_" if name else ""
+    bound = inf if most is None or limit == "saturate" else most
     current = Variable(
-        f"{mark}current", "A", nominal=most or 1.0, doc="current of the drive",
-        lower=-inf if most is None else -most, upper=inf if most is None else most,
+        f"{mark}current", "A", nominal=most or 1.0, doc="current of the drive", lower=-bound,
+        upper=bound,
     )  # fmt: skip
     held = current.symbol
     if most is not None and limit == "saturate":

@@ -11,6 +11,7 @@ from symfric import (
     BrownMcPhee,
     Drive,
     ExactCoulomb,
+    LimitWarning,
     LuGre,
     Mechanism,
     Model,
@@ -73,9 +74,11 @@ def test_the_current_saturates_only_in_simulation() -> None:
     stage = drive(Stribeck(), m=1.0, N=1.0)
     bounded = driven(stage, d, limit="bounds")
     assert (bounded.u[0].lower, bounded.u[0].upper) == (-2.0, 2.0)
-    clipped = simulate(driven(stage, d), 0.5, u={"current": 50.0})
+    clipped = simulate(driven(stage, d), 0.5, u={"current": 50.0})  # without a LimitWarning
     assert clipped.final["x"] == pytest.approx(simulate(stage, 0.5, u={"force": 2.0}).final["x"])
-    assert simulate(bounded, 0.5, u={"current": 50.0}).final["x"] > 2 * clipped.final["x"]
+    with pytest.warns(LimitWarning, match="current from t = 0 s, up to 50 A"):
+        beyond = simulate(bounded, 0.5, u={"current": 50.0})
+    assert beyond.final["x"] > 2 * clipped.final["x"]
 
 
 def arm(law: Any) -> Model:
