@@ -86,9 +86,9 @@ class Velocity:
 
         V = V_x + W (V_v - V_x),   W = E_x / (E_x + E_v),   E = W^2 E_v + (1 - W)^2 E_x
 
-    With W averaged over 1/500 of the band or 99 frequencies, this has almost the least noise of all
-    unbiased combinations. E_x is white noise of the position after the central difference
-    s = sin(w h) / h, plus the bias of this difference:
+    With W averaged over 1 Hz or 99 frequencies, this has almost the least noise of all unbiased
+    combinations. E_x is white noise of the position after the central difference s = sin(w h) / h,
+    plus the bias of this difference:
 
         E_x = S_x s^2 + (1 - s / w)^2 (|V_v|^2 - S_v)
 
@@ -149,15 +149,15 @@ class Velocity:
         if x is None:
             return Velocity(frequency, ones, of_v, power, of_v, 1)
         deficit = 1 - np.sinc(2 * frequency)
-        short = deficit**2 * np.maximum(averaged(measured, WIDTH) - of_v, 0.0)
-        usual = averaged(by_x, WIDTH) + short
-        apart = averaged(spectrum(v - central_difference(x, step)), WIDTH)
+        short = deficit**2 * np.maximum(averaged(measured, step, WIDTH) - of_v, 0.0)
+        usual = averaged(by_x, step, WIDTH) + short
+        apart = averaged(spectrum(v - central_difference(x, step)), step, WIDTH)
         differ = (apart > SURE * usual) | (SURE * apart < usual)
         of_v = np.maximum(of_v, np.where(differ, np.abs(apart - usual), 0.0))
         by_x = by_x + short
         both = by_x + of_v
         best = np.divide(by_x, both, out=np.ones(both.size), where=both > 0)
-        weight = averaged(best, WIDTH)  # narrow bands ring at ends of the record
+        weight = averaged(best, step, WIDTH)  # narrow bands ring at ends of the record
         noise = weight**2 * of_v + (1 - weight) ** 2 * by_x
         found = Velocity(frequency, weight, noise, measured, noise, 1)
         mixed = spectrum(found.mixed(central_difference(x, step), v), line=True)

@@ -8,7 +8,7 @@ Source: Gautier, Janot and Vandanjon, IEEE Trans. Control Syst. Technol. 21(2), 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from math import ceil, log2
+from math import ceil, floor, log2, log10
 from typing import Any, final
 
 import numpy as np
@@ -29,8 +29,8 @@ LOST = 0.01
 """Largest share of noise in the acceleration of the used band."""
 DIFFERENCE = (1.0, -2.0, 1.0)
 """Coefficients of the second difference."""
-FEW, WIDE = 9, 1e-3
-"""Least number and share of entries for the mean of a spectrum, to separate motion from noise."""
+FEW = 9
+"""Least number of neighbours for the mean of a spectrum in which motion is separated from noise."""
 
 
 @final
@@ -315,11 +315,16 @@ def rounded_level(signal: Array, power: Array) -> float:
     return max(noise_level(power), count_of(signal) ** 2 / 12)
 
 
-def averaged(power: Array, least: int = FEW) -> Array:
-    """Return a spectrum averaged over its share `WIDE` or `least` neighbours, the wider one."""
-    ones = np.ones(min(max(least, 2 * round(WIDE * (power.size - 1)) + 1), power.size))
+def averaged(power: Array, step: float, least: int = FEW) -> Array:
+    """Return a spectrum averaged over 1 Hz or `least` neighbours, whichever is wider."""
+    ones = np.ones(_width(power, step, least))
     count = np.convolve(np.ones(power.size), ones, mode="same")
     return np.convolve(power, ones, mode="same") / count
+
+
+def _width(power: Array, step: float, least: int) -> int:
+    """Return the number of entries of a spectrum in 1 Hz, at least `least` and at most all."""
+    return min(max(least, 2 * round((power.size - 1) * step) + 1), power.size)
 
 
 def position_band(x: Array, step: float) -> float:
@@ -333,7 +338,7 @@ def position_band(x: Array, step: float) -> float:
 
 
 def band_above(power: Array, noise: Array, step: float, order: int) -> float:
-    """Return the highest frequency [Hz] at which the mean exceeds `ABOVE` times the noise.
+    """Return the highest frequency [Hz] at which the 1 Hz mean exceeds `ABOVE` times the noise.
 
     The noise of the acceleration, derivative number `order`, up to this frequency is at most the
     share `LOST` of its motion. Isolated lines far above the motion, such as those of a coarse
@@ -342,7 +347,7 @@ def band_above(power: Array, noise: Array, step: float, order: int) -> float:
     frequency = np.linspace(0.0, 0.5 / step, power.size)
     weight = np.arange(power.size) ** (2.0 * order)
     lost = np.cumsum(weight * noise) > LOST * np.cumsum(weight * np.maximum(power - noise, 0.0))
-    known = np.flatnonzero((averaged(power) > ABOVE * noise) & ~lost)
+    known = np.flatnonzero((averaged(power, step) > ABOVE * noise) & ~lost)
     return float(frequency[max(1, known[-1])] if known.size else frequency[1])
 
 
@@ -353,14 +358,16 @@ def choose_filter(
 
         cut-off 5 f_b (at most half the Nyquist frequency), decimation 0.8 Nyquist / (2 f_b)
 
-    The factors are those of the EMPS reference, which sets f_b = 20 Hz by hand. f_a is the median
-    of `bands`, the significant bandwidths of the coordinates. It limits f_b and the cut-off of the
-    decimation, 0.9 Nyquist / decimation, because noise in the acceleration lowers the mass. At
-    least `rows` equations remain, if possible.
+    f_b is rounded to one digit. The factors are those of the EMPS reference, which sets f_b = 20 Hz
+    by hand. f_a is the median of `bands`, the significant bandwidths of the coordinates. It limits
+    f_b and the cut-off of the decimation, 0.9 Nyquist / decimation, because noise in the
+    acceleration lowers the mass. At least `rows` equations remain, if possible.
     """
     nyquist = 0.5 / step
     known = float(np.median([*bands] or [nyquist]))
-    f_b = max(min(bandwidth(force, step), known), 1 / (force.size * step))
+    found = max(min(bandwidth(force, step), known), 1 / (force.size * step))
+    digit = 10.0 ** floor(log10(found))
+    f_b = round(found / digit) * digit
     wanted = max(round(0.4 * nyquist / f_b), round(PASS * nyquist / known))
     decimation = min(wanted, force.size // (rows + 4 * LOBES))
     return Filter(min(5 * f_b, 0.5 * nyquist), max(1, decimation))

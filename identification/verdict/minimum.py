@@ -13,14 +13,7 @@ from typing import NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.residuals.evaluation import (
-    Array,
-    Blocks,
-    Channel,
-    Extended,
-    influence,
-    unbiased,
-)
+from identification.residuals.evaluation import Array, Blocks, Channel, Extended, influence
 from identification.solving.task import Point, Task
 from identification.unknowns.spec import Unknown
 from identification.verdict.colour import Colour, Count, colour
@@ -284,10 +277,9 @@ def minimum(task: Task, point: Point) -> Minimum:
     raw = point.evaluation.r
     change = partial(_change, task, raw)
     channels, residuals = task.channels, task.residuals
-    bias = residuals.bias(point.values) if isinstance(residuals, Blocks | Extended) else None
-    if bias is not None:
-        each = zip(channels, bias.squares.tolist(), strict=True)
-        channels = [replace(c, motion_noise=(x / max(c.t.size, 1)) ** 0.5) for c, x in each]
+    if isinstance(residuals, Blocks | Extended):
+        each = zip(channels, residuals.motion_noise(point.values).tolist(), strict=True)
+        channels = [replace(channel, motion_noise=level) for channel, level in each]
     return Minimum(
         channels, box.unknowns, box.names, point.values, point.slope, box.at_bound(point.w),
         point.weights * point.r, point.J, gain, raw, known, change,
@@ -296,7 +288,7 @@ def minimum(task: Task, point: Point) -> Minimum:
 
 def _change(task: Task, raw: Array, values: Array) -> float:
     """Return the norm of the change of the weighted residuals from `raw` to other values."""
-    there = unbiased(task.residuals, values)
+    there = task.residuals.at(values)
     if isinstance(there, str):
         return np.inf
     return float(np.linalg.norm((there.r - raw) / task.sigma))

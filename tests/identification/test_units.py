@@ -74,7 +74,7 @@ def assert_same(kind: Any, law: str, data: Dataset, some: list[Sizes], **given: 
     numbers = {n: float(p.value) for n, p in known.items() if len(n) == 1 and p.unit == "1"}
     first: Fitted = Fit(kind, law, data, **given).solve(throw=False)
     held = [n for n, p in first.parameters.items() if p.fixed and n != "N"]
-    held = [n for n in held if known[n].role != "width"]
+    held = [n for n in held if known[n].role != "width" or known[n].unit == "N"]
     for sizes in some:
         unit = {n: size(p.unit, sizes, numbers) for n, p in known.items() if p.unit != "rad"}
         fixed = {n: unit.get(n, 1.0) * first.parameters[n].value for n in held}
@@ -93,12 +93,8 @@ def assert_same(kind: Any, law: str, data: Dataset, some: list[Sizes], **given: 
 
 
 def test_units_of_points_do_not_matter() -> None:
-    for law, some in (
-        ("stribeck", UNITS[::2]),
-        ("hollars", UNITS[::2]),
-        ("mixed_lubrication", UNITS),
-    ):
-        assert_same(Points(), law, of_law(law, False), some, starts=1)
+    for law in ("stribeck", "hollars"):
+        assert_same(Points(), law, of_law(law, False), UNITS[::2], starts=1)
 
 
 def test_units_of_a_force_balance_do_not_matter() -> None:
