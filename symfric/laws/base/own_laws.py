@@ -78,7 +78,7 @@ def called(
         if not isinstance(v, np.ndarray) and not any(text in str(error) for text in KNOWN):
             raise
         raise _unsuitable(where, v, error) from error
-    if value is None or isinstance(value, list | tuple):
+    if value is None or isinstance(value, list | tuple) or getattr(value, "dtype", "") == "O":
         raise _unsuitable(where, v, value)
     if is_symbolic(v) and isinstance(value, float) and isnan(value):
         hint = "math functions need numbers; write ca.tanh(v) instead of math.tanh(v)"
