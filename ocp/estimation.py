@@ -181,7 +181,7 @@ def estimate(
     converge. Deviations contain the mean square of the error of the linearised model. Bristles
     that start to slip within a deviation have larger errors. In sliding, the deviation of z tends
     to zero, below integration errors: with LuGre (axis of the how-to guide), 83 to 87 % of the
-    errors of z are within two deviations; single errors, below 1e-12 m, reach 5e4 of them.
+    errors of z are within two deviations; single errors, below 1e-12 m, reach 5e4 deviations.
     """
     check_model("estimate", model)
     step = checks.number("estimate: step", step, above=0.0)

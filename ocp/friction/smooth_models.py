@@ -50,7 +50,7 @@ class Width(NamedTuple):
     least: float = 0.0
 
     def at(self, layer: float) -> float:
-        """Return the parameter for a smoothing width `layer` [m/s]; `number` if one of loads."""
+        """Return the parameter for a smoothing width `layer` [m/s]; widths of loads are kept."""
         if self.layer is None:
             return self.number
         return self.number * (layer / self.layer) ** self.exponent

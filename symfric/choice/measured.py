@@ -225,7 +225,7 @@ def measured(required: Requirements, name: str, law: Law) -> RankedLaw:
 
 
 def _from_own(required: Requirements, held: Candidate, runs: Budget) -> Requirements:
-    """Return the required with a fine run of the law as the reference if the reference is `OWN`."""
+    """Return the requirements, with a fine run of the law as the reference if that is `OWN`."""
     if required.reference is not OWN:
         return required
     run = held.run(held.first, 0.1 * required.goal.fine, 10 * runs.most)

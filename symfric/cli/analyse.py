@@ -11,7 +11,7 @@ from symfric.cli.options import Strings
 from symfric.cli.select import function_of_file
 from symfric.dynamics import Branch, continuation, equilibrium, orbits_from, periodic_orbit
 from symfric.foundation import checks
-from symfric.foundation.parameters import Variable, check_names
+from symfric.foundation.parameters import Variable, check_names, parameters
 from symfric.model import Model
 from symfric.model.kinds import MODE
 from symfric.model.model import check_model
@@ -100,15 +100,17 @@ def _machine(
     name: str, x0: Strings, t_end: float | None,
 ) -> tuple[Model, dict[str, float], float]:  # fmt: skip
     """Return the model with a free parameter, the start values and the end time of a run."""
-    (chosen,) = laws.values()
+    over, (chosen,) = f"--over of {scene}", laws.values()
     if ".py" in scene:
         make = function_of_file("analyse", scene, opt.numbers("--set", settings))
         model = make(chosen)
         check_model(f"analyse '{scene}'", model)
-        check_names(f"--over of {scene}", [name], [v.name for v in (*model.p, *model.u)])
+        check_names(over, [name], [v.name for v in (*model.p, *model.u)])
         return model, opt.numbers("--x0", x0), 100.0 if t_end is None else t_end
     (machine,) = scenes_with(scene, laws, settings, preset, law_of).values()
-    model = machine.model([] if name in machine.inputs else [name])
+    known = parameters(machine)
+    model = machine.model([name] if name in known else [])
+    check_names(over, [name], [*known, *(v.name for v in model.u)])
     given = driven(machine, model, None, x0, t_end)
     if others := [one for one in given.signals if one != name]:
         raise ValueError(

@@ -140,7 +140,7 @@ def boundary(
         special: one of its Hopf points or folds, such as `branch.located("Hopf")[0]`.
         parameter: name of the second free parameter.
         between: smallest and largest value of the second parameter, within its bounds.
-        points: largest number of points.
+        points: largest number of points, half of them in each direction.
         step: longest step, relative to the magnitudes of states and the ranges of the parameters.
 
     Raises:

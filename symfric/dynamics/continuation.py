@@ -62,11 +62,11 @@ def continuation(
     where = "continuation"
     if not isinstance(start, Equilibrium | PeriodicOrbit):  # pyright: ignore[reportUnnecessaryIsInstance]
         raise checks.refused(f"{where}: start", "an equilibrium or a periodic orbit", start)
+    hint = f"free it when the model is made, such as rabinowicz(law, free=['{parameter}'])"
+    check_names(f"{where}: parameter", [parameter], [*start.p, *start.u], hint)
     if parameter in start.u:
         start = _with_parameter(start, parameter)
     model = start.model
-    hint = f"free it when the model is made, such as rabinowicz(law, free=['{parameter}'])"
-    check_names(f"{where}: parameter", [parameter], [v.name for v in model.p], hint)
     span = checked_span(where, model, between, start.p[parameter], parameter)
     checks.count(f"{where}: points", points, least=2)
     checks.number(f"{where}: step", step, above=0.0, upper=1.0)

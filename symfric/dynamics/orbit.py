@@ -264,7 +264,7 @@ def _fraction(orbit: PeriodicOrbit, problem: OrbitShooting) -> int:
     parts = [n for n in PARTS if n % 2 or not orbit.symmetric]
     at = orbit.run.at(np.array([0.0, *(orbit.period / n for n in parts)]))
     states = np.array([at[name] for name in orbit.x])
-    off = np.abs(problem.off(states[:, 1:] - states[:, :1])) / problem.scale[:, None]
+    off = np.abs(problem.without_turns(states[:, 1:] - states[:, :1])) / problem.scale[:, None]
     off = off[problem.returning].max(axis=0)
     return max([1, *(n for n, x in zip(parts, off, strict=True) if x < 10 * CLOSED * orbit.rtol)])
 
@@ -355,7 +355,7 @@ def _returning(
     times = run.looks[run.looks >= 0.5 * part]
     at = run.at(times)
     values = problem.signs[:, None] * np.array([at[name] for name in names])
-    off = problem.off(values - np.array([*x0.values()])[:, None]) / problem.scale[:, None]
+    off = problem.without_turns(values - np.array([*x0.values()])[:, None]) / problem.scale[:, None]
     return run, float(times[int(np.argmin(np.abs(off[problem.returning]).max(axis=0)))])
 
 
@@ -387,7 +387,7 @@ def _orbit(
         model, at.time, x0=x, u=problem.u, p=p, rtol=rtol, t_eval=(0.0, at.time), method=METHOD
     )
     ends = np.array([finer[name] for name in x])
-    off = np.abs(problem.off(problem.signs * ends[:, 1] - ends[:, 0])) / problem.scale
+    off = np.abs(problem.without_turns(problem.signs * ends[:, 1] - ends[:, 0])) / problem.scale
     error = float(off[problem.returning].max(initial=0.0))
     period = (1 + symmetric) * at.time
     values = dict(zip((v.name for v in model.p), model.values("p", p).tolist(), strict=True))

@@ -129,7 +129,7 @@ class OrbitShooting:
         names = self.model.angles
         return np.flatnonzero([v.name in names for v in self.model.x])
 
-    def off(self, change: Array) -> Array:
+    def without_turns(self, change: Array) -> Array:
         """Return changes of the states, shape (nx, ...), without whole turns of angles."""
         left = change.copy()
         left[self.angles] -= 2 * np.pi * np.round(left[self.angles] / (2 * np.pi))
@@ -198,7 +198,7 @@ class OrbitShooting:
             chosen, _ = bases[after]
             rows, columns = slice(at[after], at[after + 1]), slice(at[i], at[i + 1])
             end, S = sign * part.end, sign[:, None] * part.S
-            r[rows] = self.off(end - parts[after].start)[chosen]
+            r[rows] = self.without_turns(end - parts[after].start)[chosen]
             J[rows, columns] += (S @ bases[i][1])[chosen]
             J[rows, at[after] : at[after + 1]] -= np.eye(chosen.size)
             if more:

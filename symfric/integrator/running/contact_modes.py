@@ -102,11 +102,11 @@ class ContactModes:
                 moved = solve(moved)
             except ValueError:
                 continue
-            objection = self._objection(modes, free, self._rows(t, moved, d))
-            if objection is None:
+            found = objection(modes, free, self._rows(t, moved, d))
+            if found is None:
                 return moved
             trial[:] = modes
-            trial[objection[0]] = objection[1]
+            trial[found[0]] = found[1]
         return None
 
     def _trials(self, trial: Array, free: NDArray[np.bool_]) -> Iterator[Array]:
@@ -126,17 +126,16 @@ class ContactModes:
     def _rows(self, t: float, y: Array, d: Array) -> Array:
         return evaluate(self.look, np.array([t]), y, d).reshape(-1, SLIP + 1)
 
-    def _objection(
-        self, modes: Array, free: NDArray[np.bool_], rows: Array
-    ) -> tuple[int, float] | None:
-        """Return the most inconsistent contact and a better mode, or None if all are consistent."""
-        largest = max(1e-300, float(np.abs(rows[:, CHANGE]).max()))
-        found: list[tuple[float, int, float]] = []
-        for i, (up, down, change, _) in enumerate(rows):
-            if not modes[i] and min(up, down) < 0:
-                level = max((up + down) / 2, 1e-300)
-                found.append((2.0 - min(up, down) / level, i, 1.0 if up < down else -1.0))
-            elif modes[i] and free[i] and modes[i] * change < -TURNING * largest:
-                found.append((-modes[i] * change / largest, i, 0.0))
-        worst = max(found, default=None)
-        return None if worst is None else worst[1:]
+
+def objection(modes: Array, free: NDArray[np.bool_], rows: Array) -> tuple[int, float] | None:
+    """Return the most inconsistent contact and a better mode, or None if all are consistent."""
+    largest = max(1e-300, float(np.abs(rows[:, CHANGE]).max()))
+    found: list[tuple[float, int, float]] = []
+    for i, (up, down, change, _) in enumerate(rows):
+        if not modes[i] and min(up, down) < 0:
+            level = max((up + down) / 2, 1e-300)
+            found.append((2.0 - min(up, down) / level, i, 1.0 if up < down else -1.0))
+        elif modes[i] and free[i] and modes[i] * change < -TURNING * largest:
+            found.append((-modes[i] * change / largest, i, 0.0))
+    worst = max(found, default=None)
+    return None if worst is None else worst[1:]

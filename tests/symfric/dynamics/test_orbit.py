@@ -197,7 +197,7 @@ def test_a_drill_string_sticks_and_slips_up_to_a_speed_of_the_top() -> None:
 
 
 def test_a_rotor_turns_with_the_multiplier_of_liouville() -> None:
-    """And the work of its torque in a turn is what friction takes."""
+    """The work of its torque in a turn equals the losses."""
     phi, w, T = Variable("phi", "rad"), Variable("w", "rad/s"), Variable("T", "N m", start=2.0)
     bearing = contact("bearing", BrownMcPhee(mu_s=0.4, mu_d=0.3), w.symbol, 1.0)
     torque = T - bearing.force - w / 10 - 4 * ca.sin(phi)

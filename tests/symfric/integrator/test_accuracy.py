@@ -13,6 +13,7 @@ from dataclasses import replace
 from functools import cache
 from itertools import pairwise
 from math import log10, pi, sqrt
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -88,13 +89,11 @@ def break_away(model: sf.Model, v: float, span: float) -> Array:
     return sf.simulate(model, span, rtol=1e-9, method="rodas4p", x0={"v": v})["x"]
 
 
-def worst_break_away(
-    model: sf.Model, velocities: Array, span: float = SPAN, **run: object
-) -> float:
+def worst_break_away(model: sf.Model, velocities: Array, span: float = SPAN, **run: Any) -> float:
     """Largest position error over runs from several start velocities."""
     worst = 0.0
     for v in velocities.tolist():
-        found = sf.simulate(model, span, x0={"v": v}, **run)["x"]  # type: ignore[arg-type]
+        found = sf.simulate(model, span, x0={"v": v}, **run)["x"]
         worst = max(worst, deviation(found, break_away(model, v, span)))
     return worst
 
