@@ -26,7 +26,7 @@ from symfric.foundation.variable import starts_of, symbols_of
 from symfric.multibody.mechanism import Mechanism
 from symfric.multibody.urdf import carried, holding, merged, read_urdf
 from symfric.multibody.urdf_file import SINGLE, Inertial, Urdf, UrdfJoint, parse
-from symfric.multibody.urdf_text import tags
+from symfric.multibody.urdf_tags import tags
 
 TERMS = ("m", "mx", "my", "mz", "Jxx", "Jyy", "Jzz", "Jxy", "Jxz", "Jyz")
 """Inertial parameters of a body: mass, first moments, moments of inertia about its origin."""

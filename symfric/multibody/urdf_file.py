@@ -13,7 +13,7 @@ import numpy as np
 from symfric.foundation import checks
 from symfric.foundation.numeric import Array
 from symfric.multibody.spatial import unphysical
-from symfric.multibody.urdf_text import Notes, outline, tags
+from symfric.multibody.urdf_tags import Notes, outline, tags
 
 KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 SINGLE = KINDS[:3]

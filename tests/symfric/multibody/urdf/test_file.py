@@ -9,7 +9,7 @@ from robots import SMALL
 
 from symfric.multibody.outlines import box, cylinder, sphere
 from symfric.multibody.urdf_file import parse
-from symfric.multibody.urdf_text import rotation
+from symfric.multibody.urdf_tags import rotation
 
 LINK = (
     '<link name="tip"><inertial><mass value="1"/>'

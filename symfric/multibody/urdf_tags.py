@@ -1,4 +1,4 @@
-"""Numbers, poses and solids in the tags of a URDF file, and notes about them."""
+"""Tags of a URDF file: their numbers, poses and solids, and notes about them."""
 
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Iterable
