@@ -181,7 +181,9 @@ def _single(term: str, text: str, find: Find | None) -> Law:
     if wrapped := fullmatch(rf"({'|'.join(WRAPPERS)})\((.+)\)", term):
         kind, inner = WRAPPERS[wrapped[1]], law_from_text(wrapped[2], find)
         return Asymmetric(inner, inner) if issubclass(kind, Asymmetric) else kind(inner)
-    if find is not None and ".py" in term:
+    if ".py" in term:
+        if find is None:
+            raise ValueError(f"law '{text}': expected a name, got a file; import the law from it")
         return find(term)
     name = ALIASES.get(term, term)
     if name in POPULATIONS:
