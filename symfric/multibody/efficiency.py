@@ -9,7 +9,7 @@ from symfric.results.trajectory import Trajectory
 
 ENDS = ("power_a", "power_b")
 CLOSE = 1e-6
-"""Relative difference of energies received and delivered up to which an element is one piece."""
+"""Largest relative difference of the energies of an element that moves as one piece."""
 REST = 1e-9
 """Largest sliding distance [m] of an element at rest."""
 

@@ -185,7 +185,7 @@ def sketch(eq: Equations, scales: Mapping[str, float]) -> Sketch:
 
 
 def _elements_drawn(eq: Equations, used: Mapping[str, int], ground: int) -> Iterator[Mark]:
-    """Yield all forces and constraints but gravity, and springs between places.
+    """Yield the marks of forces and constraints other than gravity and springs between places.
 
     Inputs that act on joints have arrows. An element without joints and places is named at the
     place `ground`.

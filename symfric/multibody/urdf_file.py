@@ -2,7 +2,7 @@
 
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple, final
@@ -22,9 +22,9 @@ LIMITS = ("lower", "upper", "effort", "velocity")
 DYNAMICS = (("damping", "mu_viscous"), ("friction", "mu_coulomb", "frictionloss"))
 """Names in <dynamics> of damping and friction: of the specification, of Franka and of MuJoCo."""
 UNLIMITED = 1e9
-"""Magnitude from which limits are none; Gazebo writes 1e16."""
+"""Magnitude from which a limit counts as none; Gazebo writes 1e16."""
 BLANK = "\ufeff \t\r\n"
-"""Characters around the content of a file; the first one is the mark of its byte order."""
+"""Byte-order mark and white space, which may surround the content of a file."""
 POINT = 1e-15
 """Inertia per mass [m^2] below which an inertia is zero: a radius of gyration of 30 nm."""
 
@@ -85,15 +85,15 @@ class Urdf:
         joints: joints; every link except the root is the child of one joint.
         left_out: omitted tags, each with its places.
         doubts: accepted implausible values, each with its path.
-        outlines: outline of the solids in <visual> of each link [m], see `outlines`.
+        outlines: outline [m] of the solids in <visual> of each link, see `multibody.outlines`.
     """
 
     name: str
     links: Mapping[str, Inertial | None]
     joints: tuple[UrdfJoint, ...]
     left_out: tuple[str, ...]
-    doubts: tuple[str, ...] = ()
-    outlines: Mapping[str, Array] = field(default_factory=dict[str, Array])
+    doubts: tuple[str, ...]
+    outlines: Mapping[str, Array]
 
     @property
     def root(self) -> str:

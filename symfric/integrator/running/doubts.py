@@ -1,4 +1,4 @@
-"""Warnings about successful runs: friction above its static level or that adds energy, limits.
+"""Warnings about successful runs: overloaded contacts, friction that adds energy, exceeded bounds.
 
 Energy: a law whose force has the wrong sign adds energy to the motion. Two conditions are checked:
 
@@ -11,7 +11,7 @@ integral uses the trapezoidal rule over steps, since only its sign matters.
 Limits: a wrong sign in hand-written equations outside the law is not detected; ensembles are not
 checked.
 
-Limits: a state, an algebraic variable or an input leaves the bounds of its `Variable`, by more than
+Bounds: a state, an algebraic variable or an input leaves the bounds of its `Variable`, by more than
 a thousandth of the larger bound.
 
 Overload: the states of a law carry more than in any possible motion, usually its static level.
@@ -57,7 +57,7 @@ SHARE = 1e-3
 REMEMBERED = 16
 """Number of parameter sets whose first check is cached."""
 CLEAR = 1e-3
-"""Fraction of the larger bound, or of the nominal value for 0, beyond which it is exceeded."""
+"""Fraction of the larger bound, or of the nominal value for 0, by which bounds may be exceeded."""
 MARGIN = 0.05
 """Fraction by which integration errors may raise friction above its level."""
 WIDE = 0.25

@@ -88,13 +88,11 @@ def called(
         if method.__name__ == "rate" and rows not in ((), (len(law.states),)):
             raise checks.refused(where, f"as many rates as states, {len(law.states)}", rows[0])
         return value
-    shape = np.shape(like)
-    if isinstance(value, ca.DM) and value.numel() == np.prod(shape, dtype=int):
+    if isinstance(value, ca.DM) and value.numel() == np.size(like):
         value = value.full()
     if is_casadi(value):
         raise _unsuitable(where, v, value)
-    same = np.size(value) == np.prod(shape, dtype=int)
-    return np.reshape(value, shape)[()] if same else value
+    return np.reshape(value, np.shape(like))[()] if np.size(value) == np.size(like) else value
 
 
 KNOWN = ("truth value", "to_int", "out of bounds", "division by zero")
