@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from symfric.laws.base.law import State as State
     from symfric.laws.base.law import StaticLaw as StaticLaw
     from symfric.laws.base.law import Switch as Switch
-    from symfric.laws.base.parts import PHENOMENA as PHENOMENA
+    from symfric.laws.base.phenomena import PHENOMENA as PHENOMENA
     from symfric.laws.catalogue import ALL_LAWS as ALL_LAWS
     from symfric.laws.catalogue import POPULATIONS as POPULATIONS
     from symfric.laws.catalogue import any_from_text as any_from_text

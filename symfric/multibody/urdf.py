@@ -4,6 +4,7 @@ import re
 import warnings
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
+from math import inf
 from pathlib import Path
 from typing import NamedTuple
 
@@ -20,7 +21,7 @@ from symfric.multibody.joint import Joint, JointFriction
 from symfric.multibody.joints import Floating, Planar, Prismatic, Revolute
 from symfric.multibody.mechanism import Mechanism
 from symfric.multibody.spatial import GROUND, Vector, unphysical
-from symfric.multibody.urdf_file import Array, Inertial, Urdf, UrdfJoint, parse
+from symfric.multibody.urdf_file import UNLIMITED, Array, Inertial, Urdf, UrdfJoint, parse
 
 KINDS: dict[str, type[Joint]] = {
     "continuous": Revolute,
@@ -347,7 +348,8 @@ def _limit(m: Mechanism, moved: Iterable[UrdfJoint], names: _Names, stops: bool)
     for joint in moved:
         name, limits = names.joints[joint.name], joint.limits
         if "lower" in limits and not stops:
-            m.limit(name, limits["lower"], limits["upper"])
+            low, high = limits["lower"], limits["upper"]
+            m.limit(name, low if low > -UNLIMITED else -inf, high if high < UNLIMITED else inf)
         if "velocity" in limits:
             m.limit(f"{name}_rate", -limits["velocity"], limits["velocity"])
         if "effort" in limits and joint.mimic is None:

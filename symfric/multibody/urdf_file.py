@@ -237,18 +237,17 @@ def _limits(where: str, kind: str, tag: ET.Element | None, notes: Notes) -> dict
     """Return the limits that apply to a joint: ends with lower < upper, and others above zero."""
     given = {} if tag is None or kind == "fixed" else tag.attrib
     found = {key: notes.number(f"{where} > limit", tag, key) for key in LIMITS if key in given}
+    low, high = (found.get(key, 0.0) for key in LIMITS[:2])
     found = {key: value for key, value in found.items() if abs(value) < UNLIMITED}
     if kind not in SINGLE:
         if found:
             notes.left("limit", where)
         return {}
-    low, high = found.pop("lower", 0.0), found.pop("upper", 0.0)
-    if kind != "continuous" and low < high:
+    stated, ends = [found.pop(key) for key in LIMITS[:2] if key in found], dict[str, float]()
+    if stated and kind != "continuous" and low < high:
         ends = {"lower": low, "upper": high}
-    else:
-        ends = dict[str, float]()
-        if low or high:
-            notes.left("limit lower, upper", where)
+    elif any(stated):
+        notes.left("limit lower, upper", where)
     for key in [key for key, value in found.items() if value <= 0]:  # exporters write 0 for none
         notes.left(f'limit {key}="{given[key]}"', where)
         del found[key]

@@ -92,7 +92,8 @@ def _exceeded(integrator: Integrator, inputs: InputData, run: RunRecord, p: Arra
     limited = [v for v in every if isfinite(v.lower) or isfinite(v.upper)]
     if not limited:
         return
-    t, y = run.seen
+    t, y = (np.repeat(seen, 2, axis=0) for seen in run.seen)
+    t[2::2] = np.nextafter(t[2::2], t[0])  # before a sample of an input
     values = _over_time(integrator, inputs, "bounded", symbols_of(limited), t, y, p)
     for v, x in zip(limited, values, strict=True):
         beyond = np.maximum(v.lower - x, x - v.upper)

@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import wraps
 from inspect import cleandoc
 from math import inf, isfinite
@@ -17,8 +17,8 @@ from symfric.foundation.parameters import Parametric, parameters, parametric
 from symfric.foundation.symbolic import plain
 from symfric.foundation.vector import VectorRows
 from symfric.laws.base import smooth
-from symfric.laws.base.parts import CONFIDENCE, called, check_class, of_user
-from symfric.laws.base.parts import Switch as Switch
+from symfric.laws.base.own_laws import called, check_class, with_checks
+from symfric.laws.base.phenomena import CONFIDENCE
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -102,6 +102,28 @@ APPLIED_FORCE = Input(FORCE, "N", "force that keeps the sliding velocity constan
 """Force that the contact must carry for zero acceleration: m dv/dt = F_e - F."""
 
 
+@dataclass(frozen=True, eq=False)
+class Switch:
+    """Change of mode: the states in `reset` jump when `expression` passes through zero.
+
+    Attributes:
+        expression: function of v, N, z and the further inputs of the law.
+        direction: 1 for rising zeros only, -1 for falling zeros only, 0 for both.
+        reset: maps a state to its value after the change, in terms of the values before it.
+        halts: True if the sliding velocity is set to exactly zero at the change.
+        at_start: True if it also occurs at the start when the expression is already beyond zero.
+        rtol: largest relative tolerance of a run, for laws that require accurate instants.
+    """
+
+    name: str
+    expression: Scalar
+    direction: int = 0
+    reset: Mapping[str, Scalar] = field(default_factory=dict[str, Scalar])
+    halts: bool = False
+    at_start: bool = False
+    rtol: float = inf
+
+
 def with_states(method: Callable[..., Any]) -> Callable[..., Any]:
     """Wrap `method(law, v, N, z)` so that it accepts states in any common form, with checks."""
 
@@ -144,7 +166,7 @@ class Law(Parametric, ABC):
         if not cls.__module__.startswith("symfric."):
             check_class(cls)
             if "outside" in vars(cls):
-                cls.outside = of_user(cls.outside)
+                cls.outside = with_checks(cls.outside)
         for name in ("force", "rate"):
             if name in vars(cls):
                 setattr(cls, name, with_states(vars(cls)[name]))

@@ -28,7 +28,7 @@ from refusing import not_refused
 import symfric as sf
 from docs.machine.items import MADE_OF_LAWS
 from symfric.foundation.parameters import ROLES
-from symfric.laws.base.parts import CONFIDENCE
+from symfric.laws.base.phenomena import CONFIDENCE
 from symfric.laws.catalogue import WRAPPERS
 from symfric.scenes import ALL_SCENES, Robot
 

@@ -328,7 +328,7 @@ def test_a_class_without_its_decorator_is_refused() -> None:
 def test_mistakes_in_laws_of_users_get_one_sentence() -> None:
     for body, message in table(__file__, "own_mistakes").items():
         known = {name: getattr(sf, name) for name in ("State", "StaticLaw", "param")}
-        known |= {"ca": ca, "math": math, "smooth": smooth}
+        known |= {"ca": ca, "math": math, "np": np, "smooth": smooth}
         force = "def force(self, v, N, z=()): return N * smooth.sign(v, 1e-3)"
         with pytest.raises(ValueError, match=re.escape(message)):
             exec(f"class Own(StaticLaw):\n    {force}\n    {body}", known)

@@ -195,6 +195,16 @@ def test_a_bound_of_zero_is_exceeded_by_a_share_of_the_nominal_value() -> None:
         sf.simulate(model, 1.1)
 
 
+@pytest.mark.parametrize(("samples", "first"), [(sf.Hold, "2"), (sf.Linear, "1.5")])
+def test_samples_of_an_input_exceed_its_bounds_from_the_right_time(
+    samples: type, first: str
+) -> None:
+    x, u = sf.Variable("x", "m"), sf.Variable("u", "m/s", lower=-1.0, upper=1.0)
+    model = sf.Model("moved", x=(x,), u=(u,), ode=u.symbol)
+    with pytest.warns(sf.LimitWarning, match=f"u from t = {first} s, up to 2 m/s"):
+        sf.simulate(model, 4.0, u={"u": samples((0.0, 1.0, 2.0, 3.0), (0.0, 0.0, 2.0, 0.0))})
+
+
 def test_laws_are_not_inserted_for_friction_that_only_brakes(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

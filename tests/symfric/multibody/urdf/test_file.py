@@ -55,6 +55,7 @@ def test_numbers_of_links_and_joints_are_read() -> None:
         ("revolute", 'lower="0" upper="0" effort="0" velocity="-1.0"', (None,) * 4,
          'effort="0"> of joint \'wrist\' <limit velocity="-1.0"'),
         ("revolute", 'lower="-1e16" upper="1e16" effort="9"', (None, None, 9.0, None), ""),
+        ("revolute", 'lower="-1e16" upper="2"', (-1e16, 2.0, None, None), ""),
         ("planar", 'effort="9" velocity="2"', (None,) * 4, None),
         ("fixed", 'lower="-1" upper="2.5" effort="7"', (None,) * 4, ""),
     ],

@@ -2,7 +2,7 @@
 
 import warnings
 from itertools import product
-from math import pi
+from math import inf, pi
 
 import casadi as ca
 import numpy as np
@@ -176,6 +176,9 @@ def test_limits_of_the_file_bound_the_model_and_a_run_names_those_it_exceeds() -
     assert abs(run.at(np.array([first]))["hinge_rate"][0]) == pytest.approx(3.0, rel=0.1)
     stopped = read_urdf(text, stop_stiffness=500.0)
     assert sorted(stopped.limits) == ["hinge_rate", "tau_hinge"]
+    one_sided = text.replace('"-1"', '"-1e16"')
+    assert read_urdf(one_sided).limits["hinge"] == (-inf, 2.0)
+    assert len(read_urdf(one_sided, stop_stiffness=500.0).build().x) == 2
     m.limit("hing", 0.0, 1.0)
     with pytest.raises(ValueError, match=r"'small' > limit: .* got hing"):
         m.build()

@@ -1,7 +1,7 @@
-"""Phenomena, changes of mode, and checks of laws that users write."""
+"""Checks of laws that users write."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import Field, dataclass, field
+from collections.abc import Callable
+from dataclasses import Field
 from functools import wraps
 from inspect import signature
 from math import inf, isnan
@@ -13,53 +13,6 @@ import numpy as np
 from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar, is_casadi, is_symbolic
 from symfric.foundation.symbolic import plain
-
-PHENOMENA = {
-    "D": "dynamic (kinetic) friction",
-    "S": "static friction (stiction or a break-away peak)",
-    "St": "Stribeck effect",
-    "V": "viscous friction",
-    "P": "pre-sliding displacement",
-    "M": "non-local memory (hysteresis loops inside loops close)",
-    "L": "frictional lag",
-    "B": "break-away force depends on the loading rate",
-    "N": "no drift under vibration below break-away",
-    "T": "static friction grows with the dwell time",
-}
-"""Phenomena that a law can reproduce, by the codes in `Facts.phenomena`."""
-
-CONFIDENCE = {
-    "two sources": "the formula was compared with two independent ones",
-    "one source": "the formula was compared with one",
-    "textbook": "the formula is in every textbook",
-    "rebuilt": "the formula was lost or garbled, and rebuilt from descriptions of it",
-    "constructed": "constructed here",
-    "unverified": "written from memory, compared with no publication and no public code",
-}
-"""Confidence in a formula, by the words in `Facts.confidence`."""
-
-
-@dataclass(frozen=True, eq=False)
-class Switch:
-    """Change of mode: the states in `reset` jump when `expression` passes through zero.
-
-    Attributes:
-        expression: function of v, N, z and the further inputs of the law.
-        direction: 1 for rising zeros only, -1 for falling zeros only, 0 for both.
-        reset: maps a state to its value after the change, in terms of the values before it.
-        halts: True if the sliding velocity is set to exactly zero at the change.
-        at_start: True if it also occurs at the start when the expression is already beyond zero.
-        rtol: largest relative tolerance of a run, for laws that require accurate instants.
-    """
-
-    name: str
-    expression: Scalar
-    direction: int = 0
-    reset: Mapping[str, Scalar] = field(default_factory=dict[str, Scalar])
-    halts: bool = False
-    at_start: bool = False
-    rtol: float = inf
-
 
 ARGUMENTS = {
     "force": "self, v, N, z=()",
@@ -103,7 +56,7 @@ def _takes(given: Any, wanted: str) -> bool:
     return [*given.parameters][1:3] != ["N", "v"]
 
 
-def of_user(method: Callable[..., Any]) -> Callable[..., Any]:
+def with_checks(method: Callable[..., Any]) -> Callable[..., Any]:
     """Wrap the method `outside(law, speed, N)` of a user's law so that its result is checked."""
 
     @wraps(method)
@@ -125,7 +78,7 @@ def called(
         if not isinstance(v, np.ndarray) and not any(text in str(error) for text in KNOWN):
             raise
         raise _unsuitable(where, v, error) from error
-    if value is None or isinstance(value, list | tuple):
+    if value is None or isinstance(value, list | tuple) or getattr(value, "dtype", "") == "O":
         raise _unsuitable(where, v, value)
     if is_symbolic(v) and isinstance(value, float) and isnan(value):
         hint = "math functions need numbers; write ca.tanh(v) instead of math.tanh(v)"
