@@ -15,7 +15,7 @@ from symfric.cli import output
 from symfric.cli.codegen_report import report
 from symfric.cli.controllers import REALS, write_controllers
 from symfric.cli.fixed_point import FIXED, write_fixed
-from symfric.cli.machines import kind_of, settable, with_set
+from symfric.cli.machines import OwnMachine, kind_of, settable, with_set
 from symfric.cli.options import Strings
 from symfric.codegen import (
     Block,
@@ -337,15 +337,19 @@ def plant(
     machine: Scene, h: float | None = None, **how: Any
 ) -> tuple[Block, tuple[StepError, ...], Callable[[], Block]]:
     """Return the block of a plant, its errors, and a function for the block with h variable."""
-    block, size = plant_block(machine, h=h, **how), STEP_SIZE if h is None else h
+    source = machine.model() if isinstance(machine, OwnMachine) else machine
+    block, size = plant_block(source, h=h, **how), STEP_SIZE if h is None else h
     errors = fixed_steps(machine, size, how["method"])
     limits = (*block.limits, *(str(one) for one in errors if one.h == size))
-    return replace(block, limits=limits), errors, partial(plant_block, machine, **how)
+    return replace(block, limits=limits), errors, partial(plant_block, source, **how)
 
 
 def fixed_steps(machine: Scene, h: float, method: str) -> tuple[StepError, ...]:
-    """Return the errors of steps around h with the inputs of the scene; none if it stops."""
-    if h >= machine.t_end:
+    """Return the errors of steps around h with the inputs of the scene; none if it stops.
+
+    A machine of a file has no typical motion, and the result is empty.
+    """
+    if not h < machine.t_end:
         return ()
     inputs = {name: own.function for name, own in machine.inputs.items()}
     try:
