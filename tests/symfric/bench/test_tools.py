@@ -20,10 +20,9 @@ from symfric.bench import identification_measured as measured
 from symfric.bench.codegen import PROVEN, plants, trials
 from symfric.bench.identification import files, outcome
 from symfric.bench.identification_files import campaign
-from symfric.bench.identification_memory import ranked
 from symfric.bench.identification_online import Axis, judged
 from symfric.bench.identification_records import ar
-from symfric.bench.identification_repeats import far
+from symfric.bench.identification_simulated import far, ranked
 from symfric.bench.interop import GOAL, ROUTES, STEPS, N, T, missed, move
 from symfric.bench.ocp import controllers
 from symfric.bench.report import GOALS, Row
