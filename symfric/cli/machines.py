@@ -6,7 +6,7 @@ from functools import partial
 from inspect import isclass, signature
 from math import isnan, nan
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar, NamedTuple, final
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, final
 
 import numpy as np
 
@@ -78,10 +78,11 @@ def kind_of(
         laws = tuple(relative(law) for law in others.values())
         return lambda law: Robot(relative(law), scene, tuple(others), laws)
     if ".py" in scene:
-        _, kind = named_in_file(where, scene, "machine", callable)
-        if not callable(kind):
-            raise checks.refused(f"{where} '{scene}'", "a function law -> Model, or a scene", kind)
-        if not (isclass(kind) and issubclass(kind, Scene)):
+        _, found = named_in_file(where, scene, "machine", callable)
+        if not callable(found):
+            raise checks.refused(f"{where} '{scene}'", "a function law -> Model, or a scene", found)
+        kind: Any = found
+        if not (isclass(found) and issubclass(found, Scene)):
             check_names(f"--preset of {scene}", [preset] if preset else [], ())
             check_names(f"--law-of of {scene}", others, ())
             return partial(OwnMachine, source=scene, make=kind)
