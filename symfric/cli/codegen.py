@@ -336,27 +336,22 @@ def machine_of(
 def plant(
     machine: Scene, h: float | None = None, **how: Any
 ) -> tuple[Block, tuple[StepError, ...], Callable[[], Block]]:
-    """Return the block of a plant, its errors, and a function for the block with h variable."""
+    """Return the block of a plant, its errors, and a function for the block with h variable.
+
+    The errors are those of steps around h with the inputs of the scene, unless its motion is
+    shorter than h or unknown.
+    """
     source = machine.model() if isinstance(machine, OwnMachine) else machine
     block, size = plant_block(source, h=h, **how), STEP_SIZE if h is None else h
-    errors = fixed_steps(machine, size, how["method"])
+    errors: tuple[StepError, ...] = ()
+    if size < machine.t_end:
+        inputs = {name: own.function for name, own in machine.inputs.items()}
+        try:
+            errors = step_errors(machine, size, machine.t_end, u=inputs, method=how["method"])
+        except SolveError as error:
+            output.note(f"errors of fixed steps were not measured: {error}")
     limits = (*block.limits, *(str(one) for one in errors if one.h == size))
     return replace(block, limits=limits), errors, partial(plant_block, source, **how)
-
-
-def fixed_steps(machine: Scene, h: float, method: str) -> tuple[StepError, ...]:
-    """Return the errors of steps around h with the inputs of the scene; none if it stops.
-
-    A machine of a file has no typical motion, and the result is empty.
-    """
-    if not h < machine.t_end:
-        return ()
-    inputs = {name: own.function for name, own in machine.inputs.items()}
-    try:
-        return step_errors(machine, h, machine.t_end, u=inputs, method=method)
-    except SolveError as error:
-        output.note(f"errors of fixed steps were not measured: {error}")
-        return ()
 
 
 def online(
