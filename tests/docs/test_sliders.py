@@ -51,7 +51,13 @@ def test_the_force_in_the_browser_is_that_of_python(name, page):
 
 
 @needs_browser
-@pytest.mark.parametrize("name", ALL_LAWS)
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=[pytest.mark.slow] * (number % 6 > 0))
+        for number, name in enumerate(ALL_LAWS)
+    ],
+)
 def test_steps_in_the_browser_are_those_of_python(name, page):
     law, rng = ALL_LAWS[name](), np.random.default_rng(0)
     others = {i.name for i in law.inputs}

@@ -4,7 +4,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from symfric import BrownMcPhee, ExactCoulomb, LuGre, Model, Variable, rabinowicz, simulate
+from symfric import GMS, BrownMcPhee, ExactCoulomb, LuGre, Model, Variable, rabinowicz, simulate
 from symfric.laws import Viscous
 
 
@@ -71,6 +71,12 @@ def test_two_slips_make_one_period() -> None:
     run = simulate(Model("two", x=(x, y, v, w), ode=ode), 40.0, rtol=1e-10)
     assert run.period("x").period == pytest.approx(2 * np.pi, rel=1e-8)
     assert run.period("y").period == pytest.approx(2 * np.pi, rel=1e-8)
+
+
+def test_a_bristle_that_vibrates_does_not_define_the_period() -> None:
+    run = simulate(rabinowicz(GMS()), 40.0)
+    assert run.period().period == pytest.approx(run.period(run.model.expression("v")).period)
+    assert run.period().period > 5.0
 
 
 def test_runs_without_a_cycle_are_refused() -> None:
