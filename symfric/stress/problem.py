@@ -118,7 +118,8 @@ class CaseProblem:
 
     def run(self, rtol: float, method: str, **options: Any) -> Trajectory:
         """Return a run of `simulate` without warnings; errors are those of `simulate`."""
-        given = {"x0": self.case.x0, "t_eval": self.times, "backend": "vm"} | options
+        given: dict[str, Any] = {"x0": self.case.x0, "t_eval": self.times, "backend": "vm"}
+        given |= options
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)
             return simulate(
