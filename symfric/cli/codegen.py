@@ -13,8 +13,7 @@ from symfric import Law, with_values
 from symfric.cli import options as opt
 from symfric.cli import output
 from symfric.cli.codegen_report import report
-from symfric.cli.controllers import REALS, write_controllers
-from symfric.cli.fixed_point import FIXED, write_fixed
+from symfric.cli.codegen_targets import FIXED, REALS, write_controllers, write_fixed
 from symfric.cli.machines import kind_of, settable, with_set
 from symfric.cli.options import Strings
 from symfric.codegen import (

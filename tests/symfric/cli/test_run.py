@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from robots import SMALL
+from tables import sampled
 
 from symfric import Linear, LuGre, drive, parameters, rabinowicz, simulate
 from symfric.cli import scenes as command
@@ -231,7 +232,7 @@ def test_all_scenes_are_listed(symfric, monkeypatch: pytest.MonkeyPatch) -> None
         assert all(preset in out for preset in kind.presets)
 
 
-@pytest.mark.parametrize("name", ALL_SCENES)
+@pytest.mark.parametrize("name", sampled(ALL_SCENES, of=3))
 def test_a_scene_shows_all_that_it_accepts_and_computes(name: str, symfric) -> None:
     out = symfric(f"scenes {name}").out
     kind, scene = ALL_SCENES[name], ALL_SCENES[name](ALL_LAWS["viscous"]())
