@@ -1,6 +1,7 @@
 """Settings of the whole test suite."""
 
 import gc
+import os
 import signal
 import sys
 from collections.abc import Iterator
@@ -29,6 +30,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_configure(config: pytest.Config) -> None:
     gc.disable()  # collecting the tests leaves no garbage; searching it took a quarter of the time
+    # Workers and the programs that tests start read compiled sources, also where nobody keeps them.
+    sys.dont_write_bytecode = False
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
     stored.chosen["update"] = config.getoption("--update-golden")
     stored.chosen["recompute"] = config.getoption("--recompute")
     # A shell lets its background jobs ignore SIGINT, which the tests of Ctrl-C raise.
@@ -47,6 +51,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 def pytest_collection_finish() -> None:
     gc.freeze()
+    gc.set_threshold(20_000)  # looks for garbage took a tenth of the time of the tests
     gc.enable()
 
 

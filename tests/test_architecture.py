@@ -1,9 +1,10 @@
-"""Structure of the source: import directions, sizes, and forbidden calls."""
+"""Structure of the source: import directions, sizes, and kinks of formulas."""
 
 import ast
 import tomllib
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
@@ -16,7 +17,6 @@ PACKAGES = ("symfric", "ocp", "identification")
 SOURCES = [path for package in PACKAGES for path in sorted((ROOT / package).rglob("*.py"))]
 TESTS = sorted((ROOT / "tests").rglob("*.py"))
 FUNCTIONS = ast.FunctionDef | ast.AsyncFunctionDef
-KEPT = FUNCTIONS | ast.ClassDef | ast.Import | ast.ImportFrom | ast.Call | ast.Assert
 
 FRONTS = tuple(".".join(p.parent.relative_to(ROOT).parts) for p in SOURCES if p.stem == "__init__")
 """Packages; their modules do not import from their `__init__`."""
@@ -31,35 +31,57 @@ def within(module: str, unit: str) -> bool:
     return module == unit or module.startswith(f"{unit}.")
 
 
+@dataclass(frozen=True)
+class Source:
+    """What the rules ask of a file: no syntax tree is kept, which would slow down the next one."""
+
+    imported: frozenset[str]
+    """Modules of this project, `from symfric import x` resolved to the module."""
+    classes: tuple[str, ...]
+    long: tuple[str, ...]
+    """Functions of more than 60 lines."""
+    calls: frozenset[str]
+    """Names that are called, bare or as an attribute of something other than `smooth`."""
+
+
 @cache
-def imported(path: Path) -> frozenset[str]:
-    """Modules of this project that a file names, `from symfric import x` resolved to the module."""
-    found = set[str]()
-    for node in nodes(path):
-        if isinstance(node, ast.Import):
-            names = [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom) and node.module:
-            names = [
-                f"{node.module}.{a.name}" if is_module(f"{node.module}.{a.name}") else node.module
-                for a in node.names
-            ]
-        else:
-            continue
-        found.update(name for name in names if name.split(".")[0] in PACKAGES)
-    return frozenset(found)
+def source(path: Path) -> Source:
+    """Read a file."""
+    nodes = [*ast.walk(ast.parse(path.read_text(encoding="utf-8"), str(path)))]
+    return Source(
+        frozenset(n for node in nodes for n in imports(node) if n.split(".")[0] in PACKAGES),
+        tuple(node.name for node in nodes if isinstance(node, ast.ClassDef)),
+        tuple(node.name for node in nodes if isinstance(node, FUNCTIONS) and lines(node) > 60),
+        frozenset(called(node.func) for node in nodes if isinstance(node, ast.Call)),
+    )
+
+
+def imports(node: ast.AST) -> list[str]:
+    if isinstance(node, ast.Import):
+        return [alias.name for alias in node.names]
+    if not isinstance(node, ast.ImportFrom) or not node.module:
+        return []
+    names = [f"{node.module}.{alias.name}" for alias in node.names]
+    return [name if is_module(name) else node.module for name in names]
+
+
+def lines(node: FUNCTIONS) -> int:
+    body = node.body[1:] if ast.get_docstring(node) else node.body
+    return (body[-1].end_lineno or 0) - body[0].lineno + 1 if body else 0
+
+
+def called(function: ast.expr) -> str:
+    if isinstance(function, ast.Name):
+        return function.id
+    owner = function.value if isinstance(function, ast.Attribute) else None
+    smooth = isinstance(owner, ast.Name) and owner.id == "smooth"
+    return function.attr if isinstance(function, ast.Attribute) and not smooth else ""
 
 
 @cache
 def is_module(name: str) -> bool:
     path = ROOT.joinpath(*name.split("."))
     return path.with_suffix(".py").exists() or (path / "__init__.py").exists()
-
-
-@cache
-def nodes(path: Path) -> list[ast.AST]:
-    """Imports, functions, classes, calls and assertions of a file."""
-    tree = ast.parse(path.read_text(encoding="utf-8"), str(path))
-    return [node for node in ast.walk(tree) if isinstance(node, KEPT)]
 
 
 @cache
@@ -105,13 +127,13 @@ def test_imports_point_down(path: Path) -> object:
     if module == "symfric" or on_top(module):
         return ()
     folder = folder_of(module)
-    return folder not in FLOORS or [n for n in imported(path) if not allowed(n, folder)]
+    return folder not in FLOORS or [n for n in source(path).imported if not allowed(n, folder)]
 
 
 @each_source
 def test_modules_do_not_import_from_the_init_of_their_own_package(path: Path) -> object:
     module = dotted(path)
-    fronts = {n for n in imported(path) if n in FRONTS and within(module, n)}
+    fronts = {n for n in source(path).imported if n in FRONTS and within(module, n)}
     return fronts if path.stem != "__init__" and not on_top(module) else ()
 
 
@@ -119,13 +141,13 @@ def test_no_circle_between_folders_or_files() -> None:
     """Imports inside functions and for type checkers count; `__init__.py` files do not."""
     files = {dotted(path): path for path in SOURCES if path.stem != "__init__"}
     between_files = {
-        name: {other for other in imported(path) if other in files and other != name}
+        name: {other for other in source(path).imported if other in files and other != name}
         for name, path in files.items()
     }
     between_folders: dict[str, set[str]] = {}
     for name, path in files.items():
         if not on_top(name):
-            there = {folder_of(other) for other in imported(path)} - {folder_of(name)}
+            there = {folder_of(other) for other in source(path).imported} - {folder_of(name)}
             between_folders.setdefault(folder_of(name), set()).update(there)
     for arrows in (between_files, between_folders):
         TopologicalSorter(arrows).prepare()  # CycleError names a circle
@@ -136,43 +158,23 @@ def test_file_is_short(path: Path) -> object:
     return len(path.read_text(encoding="utf-8").splitlines()) > 400
 
 
-def calls(path: Path, apart_from: str = "") -> Iterator[str]:
-    """Names that are called, bare or as an attribute of something other than `apart_from`."""
-    for node in nodes(path):
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
-            yield node.func.id
-        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
-            owner = node.func.value
-            if not (isinstance(owner, ast.Name) and owner.id == apart_from):
-                yield node.func.attr
-
-
 NONSMOOTH = {"fabs", "sign", "if_else", "fmin", "fmax", "norm", "norm_1", "norm_2", "norm_inf"}
 
 
 @each_source
-def test_rules_of_the_source(path: Path) -> object:
-    """Functions below 60 lines, absolute imports, no assert, no print, one place for kinks."""
-    module, wrong = dotted(path), list[str]()
-    for node in nodes(path):
-        if isinstance(node, FUNCTIONS):
-            body = node.body[1:] if ast.get_docstring(node) else node.body
-            if body and (body[-1].end_lineno or 0) - body[0].lineno + 1 > 60:
-                wrong.append(f"{node.name} is long")
-        elif isinstance(node, ast.ImportFrom) and node.level:
-            wrong.append(f"relative import in line {node.lineno}")
-        elif isinstance(node, ast.Assert):
-            wrong.append(f"assert in line {node.lineno}")
-    if not on_top(module) and "print" in calls(path):
-        wrong.append("print")
+def test_no_function_is_long(path: Path) -> object:
+    return source(path).long
+
+
+@each_source
+def test_formulas_have_their_kinks_from_one_place(path: Path) -> object:
+    module = dotted(path)
     formulas = within(module, "symfric.laws") or within(module, "symfric.scenes")
-    if formulas and module != "symfric.laws.base.smooth":
-        wrong += NONSMOOTH & set(calls(path, apart_from="smooth"))
-    return wrong
+    return formulas and module != "symfric.laws.base.smooth" and NONSMOOTH & source(path).calls
 
 
 def test_at_most_two_classes_share_a_name() -> None:
-    names = Counter(n.name for p in SOURCES for n in nodes(p) if isinstance(n, ast.ClassDef))
+    names = Counter(name for path in SOURCES for name in source(path).classes)
     assert not [name for name, count in names.items() if count > 2]
 
 

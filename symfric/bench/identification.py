@@ -15,9 +15,8 @@ from identification import Dataset, Fit, Fitted, InverseDynamics, identify_robot
 from identification.robot.dynamics import RobotModel
 from symfric.bench.identification_files import File, campaign
 from symfric.bench.identification_measured import emps, franka
-from symfric.bench.identification_memory import gms, lugre
 from symfric.bench.identification_online import online
-from symfric.bench.identification_repeats import starts, velocity
+from symfric.bench.identification_simulated import gms, lugre, starts, velocity
 from symfric.bench.identification_verdicts import TITLE, draw, verdicts
 from symfric.bench.report import Found, Progress, Report, goal, timed
 from symfric.foundation.numeric import Array

@@ -23,18 +23,9 @@ import numpy as np
 from ocp import Phase, Problem, at_end, effort, track
 from ocp.problems import guide
 from symfric import BrownMcPhee, ExactCoulomb, Law, LuGre, Model, drive
+from symfric.bench import ocp_contenders as others
 from symfric.bench.ocp_cases import CASES, QUICK, MoveCase
-from symfric.bench.ocp_contenders import (
-    Attempt,
-    Contender,
-    do_mpc,
-    even,
-    guesses_of,
-    nosnoc,
-    opti,
-    rockit,
-    symfric,
-)
+from symfric.bench.ocp_contenders import Attempt, Contender, even, guesses_of
 from symfric.bench.ocp_referee import ControlVerdict, judged
 from symfric.bench.report import Found, Progress, Report, Row, curves
 from symfric.foundation.numeric import Array
@@ -316,9 +307,11 @@ def contenders(quick: bool) -> dict[str, Contender]:
 
     Tools that compile or build for long run with the narrow width only, and not with `quick`.
     """
-    tools: dict[str, Callable[..., Attempt]] = {"Opti": opti, "rockit": rockit, "do-mpc": do_mpc}
+    tools: dict[str, Callable[..., Attempt]] = {
+        "Opti": others.opti, "rockit": others.rockit, "do-mpc": others.do_mpc
+    }  # fmt: skip
     slow: dict[str, Callable[..., Attempt]] = {"opty": opty, "Dymos": dymos}
-    found: dict[str, Contender] = {"symfric": symfric, "nosnoc": nosnoc}
+    found: dict[str, Contender] = {"symfric": others.symfric, "nosnoc": others.nosnoc}
     for width in (NARROW,) if quick else (WIDE, NARROW):
         found |= {f"{name} {width:g}": partial(f, width=width) for name, f in tools.items()}
     if not quick:

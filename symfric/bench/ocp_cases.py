@@ -25,11 +25,6 @@ Rate = Callable[[Any, Sequence[Any], Any, Sequence[Any]], list[Any]]
 Value = Callable[[Any, Sequence[Any], Any], Any]
 
 
-def _ones(m: Any, x: Sequence[Any], u: Any) -> list[Any]:
-    del m, x, u
-    return [1.0, 1.0, 1.0]
-
-
 @final
 @dataclass(frozen=True, eq=False)
 class MoveCase:
@@ -68,7 +63,7 @@ class MoveCase:
     speed: float = 1.0
     running: Value = lambda m, x, u: u**2
     final: Value = lambda m, x, u: 0.0
-    normal: Callable[[Any, Sequence[Any], Any], list[Any]] = _ones
+    normal: Callable[[Any, Sequence[Any], Any], list[Any]] = lambda m, x, u: [1.0, 1.0, 1.0]
     bounds: Mapping[int, Box] = field(default_factory=dict[int, Box])
     size: Mapping[int, float] = field(default_factory=dict[int, float])
 
@@ -146,14 +141,6 @@ def _rest(*values: float) -> dict[int, float]:
     return dict(enumerate(values))
 
 
-def _mass(m: Any, x: Sequence[Any], u: Any, F: Sequence[Any]) -> list[Any]:
-    return [x[1], u - F[0] - 0.5 * x[1]]
-
-
-def _pendulum(m: Any, x: Sequence[Any], u: Any, F: Sequence[Any]) -> list[Any]:
-    return [x[1], u - F[0] - GRAVITY * m.sin(x[0])]
-
-
 def _cart(cart: float, bob: float, length: float, damping: float = 0.0) -> Rate:
     """Return the rates of a cart with a pendulum: x, theta from the vertical below, x', theta'."""
 
@@ -204,34 +191,15 @@ def _blocks(m: Any, x: Sequence[Any], u: Any, F: Sequence[Any]) -> list[Any]:
     return [p, q, r, b - 2.0 * a - p - F[0], a - 2.0 * b + c - q - F[1], b - c - r + u - F[2]]
 
 
-def _pushed(m: Any, x: Sequence[Any], u: Any, F: Sequence[Any]) -> list[Any]:
-    return [x[1], u - F[0]]
-
-
-def _oscillator(m: Any, x: Sequence[Any], u: Any, F: Sequence[Any]) -> list[Any]:
-    return [x[2], x[3], u - F[0] - (x[0] - x[1]), x[0] - x[1]]
-
-
-def _capsule(m: Any, x: Sequence[Any], u: Any, F: Sequence[Any]) -> list[Any]:
-    return [x[1], -u - F[0], x[3], (1.0 / 0.5 + 1.0) * u + F[0]]
-
-
-def _upright(m: Any, x: Sequence[Any], u: Any) -> Any:
-    return 10.0 * x[0] ** 2 + 100.0 * (x[1] - pi) ** 2 + x[2] ** 2 + x[3] ** 2 + u**2
-
-
-def _upright_end(m: Any, x: Sequence[Any], u: Any) -> Any:
-    return 500.0 * x[0] ** 2 + 100.0 * (x[1] - pi) ** 2 + 10.0 * (x[2] ** 2 + x[3] ** 2)
-
-
 CASES = (
     MoveCase(
-        "out_and_back", OURS, ("x", "v"), _mass, (1,), (GUIDE,), (0.0, 0.0),
-        {0.5: {0: 1.0}, 1.0: _rest(0.0, 0.0)}, limit=20.0, T=2.0,
+        "out_and_back", OURS, ("x", "v"), lambda m, x, u, F: [x[1], u - F[0] - 0.5 * x[1]], (1,),
+        (GUIDE,), (0.0, 0.0), {0.5: {0: 1.0}, 1.0: _rest(0.0, 0.0)}, limit=20.0, T=2.0,
     ),
     MoveCase(
-        "pendulum", OURS, ("phi", "phi_rate"), _pendulum, (1,), ((0.15, 0.1),), (0.0, 0.0),
-        {1.0: _rest(pi, 0.0)}, limit=3.0, T=5.0, intervals=100, size={0: 3.0, 1: 5.0},
+        "pendulum", OURS, ("phi", "phi_rate"),
+        lambda m, x, u, F: [x[1], u - F[0] - GRAVITY * m.sin(x[0])], (1,), ((0.15, 0.1),),
+        (0.0, 0.0), {1.0: _rest(pi, 0.0)}, limit=3.0, T=5.0, intervals=100, size={0: 3.0, 1: 5.0},
     ),
     MoveCase(
         "cart_pendulum", OURS, ("x", "theta", "x_rate", "theta_rate"),
@@ -242,7 +210,13 @@ CASES = (
     MoveCase(
         "cart_pole", "example of nosnoc", ("x", "theta", "v", "w"), _cart(1.0, 0.1, 1.0), (2,),
         ((2.0, 2.0),), (1.0, 0.0, 0.0, 0.0), {1.0: {}}, limit=30.0, T=5.0,
-        running=_upright, final=_upright_end, bounds={0: (-5.0, 5.0)}, size={1: 3.0, 3: 5.0},
+        running=lambda m, x, u: (
+            10.0 * x[0] ** 2 + 100.0 * (x[1] - pi) ** 2 + x[2] ** 2 + x[3] ** 2 + u**2
+        ),
+        final=lambda m, x, u: (
+            500.0 * x[0] ** 2 + 100.0 * (x[1] - pi) ** 2 + 10.0 * (x[2] ** 2 + x[3] ** 2)
+        ),
+        bounds={0: (-5.0, 5.0)}, size={1: 3.0, 3: 5.0},
     ),
     MoveCase(
         "voice_coil", "example of nosnoc after Christiansen, Maurer and Zirn, CDC 2008",
@@ -252,19 +226,21 @@ CASES = (
     ),
     MoveCase(
         "floating_oscillator", "Kim, Kased and Singh, Optim. Control Appl. Meth. 29, 2008, 257, "
-        "with given time and least squared force", ("x1", "x2", "v1", "v2"), _oscillator, (2,),
+        "with given time and least squared force", ("x1", "x2", "v1", "v2"),
+        lambda m, x, u, F: [x[2], x[3], u - F[0] - (x[0] - x[1]), x[0] - x[1]], (2,),
         ((0.5, 0.5),), (0.0,) * 4, {1.0: _rest(1.0, 1.0, 0.0, 0.0)}, limit=2.0, T=6.0,
     ),
     MoveCase(
         "pushed_block", "example of opty (10 m out and back, friction with slack variables), with "
-        "given time and least squared force", ("x", "v"), _pushed, (1,), ((5.886, 5.886),),
-        (0.0, 0.0), {0.5: _rest(10.0, 0.0), 1.0: _rest(0.0, 0.0)}, limit=400.0, T=4.0, speed=10.0,
-        size={0: 10.0, 1: 10.0},
+        "given time and least squared force", ("x", "v"), lambda m, x, u, F: [x[1], u - F[0]], (1,),
+        ((5.886, 5.886),), (0.0, 0.0), {0.5: _rest(10.0, 0.0), 1.0: _rest(0.0, 0.0)}, limit=400.0,
+        T=4.0, speed=10.0, size={0: 10.0, 1: 10.0},
     ),
     MoveCase(
         "capsule", "two-mass robot after Chernousko, J. Appl. Math. Mech. 66, 2002: 50 mm on rough "
-        "ground by an inner mass of +- 0.1 m", ("x", "v", "s", "r"), _capsule, (1,), ((2.0, 1.5),),
-        (0.0,) * 4, {1.0: _rest(0.05, 0.0, 0.0, 0.0)}, limit=10.0, T=2.0, speed=0.1,
+        "ground by an inner mass of +- 0.1 m", ("x", "v", "s", "r"),
+        lambda m, x, u, F: [x[1], -u - F[0], x[3], (1.0 / 0.5 + 1.0) * u + F[0]], (1,),
+        ((2.0, 1.5),), (0.0,) * 4, {1.0: _rest(0.05, 0.0, 0.0, 0.0)}, limit=10.0, T=2.0, speed=0.1,
         bounds={2: (-0.1, 0.1)}, size={0: 0.05, 1: 0.1, 2: 0.1},
     ),
     MoveCase(

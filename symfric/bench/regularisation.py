@@ -54,8 +54,6 @@ HALF_DECADES = tuple(10.0 ** (-k / 2) for k in range(9))
 """Factors of the widths over four decades."""
 BEYOND = 1 / 16
 """Ratio of the width of a reference without an exact law to the smallest measured width."""
-STILL = 1e-12
-"""Largest distance [s] at which an extreme counts as coincident with a sample."""
 ROUNDS = 9
 """Number of calls, of which the shortest time is used."""
 TITLE = "Error of smooth friction relative to dry friction"
@@ -206,27 +204,12 @@ def last_cycle(run: Trajectory) -> Array:
     """Return period [s] and amplitude [m] of the last stick-slip cycle of `x`.
 
     A cycle lasts from one largest elongation to the next, with the smallest elongation between
-    them. Extremes are zeros of the cubic through four samples of the velocity. The result is empty
-    if there are fewer than two largest elongations.
+    them. The result is empty if there are fewer than two largest elongations.
     """
-    t, x, v = run.t, run["x"], run["v"]
-    falls = np.flatnonzero((v[1:-2] > 0) & (v[2:-1] <= 0)) + 1
+    falls, rises = (run.crossings("v", direction) for direction in (-1, 1))
     if falls.size < 2:
         return np.zeros(0)
-    rises = np.flatnonzero((v[1:-2] < 0) & (v[2:-1] >= 0)) + 1
-    low = rises[(rises > falls[-2]) & (rises < falls[-1])][-1]
-    (first, _), (_, least), (last, most) = (
-        _extreme(t, x, v, k) for k in (falls[-2], low, falls[-1])
-    )
+    first, last = falls[-2:]
+    low = rises[(rises > first) & (rises < last)][-1]
+    least, most = run.at([low, last])["x"]
     return np.array([last - first, most - least])
-
-
-def _extreme(t: Array, x: Array, v: Array, k: int) -> tuple[float, float]:
-    """Return instant and value of the extreme of x between the samples k and k + 1."""
-    h = float(t[k + 1] - t[k])
-    rate = np.polynomial.Polynomial.fit(t[k - 1 : k + 3] - t[k], v[k - 1 : k + 3], 3).convert()
-    roots = rate.roots()
-    inside = roots.real[(np.abs(roots.imag) < STILL) & (roots.real > -STILL) & (roots.real < h)]
-    path = rate.integ()
-    at = float(inside[0])
-    return float(t[k]) + at, float(x[k] + path(at) - path(0.0))

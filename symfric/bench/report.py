@@ -333,26 +333,18 @@ def timed(call: Callable[[], T]) -> tuple[float, T]:
     return best_time(call, most=1, clock=process_time)
 
 
-def interleaved(
-    calls: Mapping[str, Callable[[], object]], rounds: int = 7, budget: float = 0.0
-) -> dict[str, float]:
+def interleaved(calls: Mapping[str, Callable[[], object]], rounds: int = 7) -> dict[str, float]:
     """Return the shortest processor time [s] of each of the `calls`, which alternate.
 
-    A temporary load of the machine affects all calls equally, so that ratios are meaningful.
-
-    Args:
-        calls: functions by name; the first call of each is not measured.
-        rounds: smallest number of measurements of each function.
-        budget: total time [s] up to which further rounds are measured.
+    A temporary load of the machine affects all calls equally, so that ratios are meaningful. The
+    first call of each is not measured.
     """
     best = dict.fromkeys(calls, inf)
     for call in calls.values():
         call()
-    began, made = perf_counter(), 0
-    while made < rounds or perf_counter() - began < budget:
+    for _ in range(rounds):
         for name, call in calls.items():
             best[name] = min(best[name], timed(call)[0])
-        made += 1
     return best
 
 

@@ -6,14 +6,14 @@ friction, if the referee of `symfric bench ocp` finds no miss above 1e-4.
 
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
-from math import inf, isfinite, nan, pi
+from math import inf, isfinite, nan
 from statistics import median
 
 import numpy as np
 
 from ocp import Problem, Solution
-from ocp.formulation.phase import Span, clipped, limits
 from ocp.problems import READY, Ready
+from ocp.solving.one_solve import starts_around
 from ocp.solving.starts import initial_points
 from ocp.transcription.schemes import Radau, make_meshes
 from ocp.transcription.transcribe import discretise
@@ -22,14 +22,11 @@ from symfric.bench.ocp_contenders import held, solved
 from symfric.bench.ocp_referee import judged
 from symfric.bench.report import Found, Progress, Report, timed
 from symfric.foundation.numeric import Array
-from symfric.foundation.parameters import Variable
 
 STARTS, RANDOM = 12, 50
 QUICK = ("out_and_back", "pendulum", "brachistochrone")
 NEAR, FAR = 0.1, 0.5
-"""Scales of the starts, see `starts_of`: near the default guess, and anywhere in the bounds."""
-WAVES = 4
-"""Number of half waves in a perturbation."""
+"""Spreads of the starts around the default guess, see `starts_of`."""
 WANTED = 1e-4
 """Largest relative miss of a verified motion."""
 BEST = 1e-3
@@ -94,47 +91,15 @@ def missed(name: str, solution: Solution) -> float:
 def starts_of(problem: Problem, count: int, scale: float) -> Iterator[dict[str, Array]]:
     """Yield guesses of all states and inputs by name; the first near start is the default one.
 
-    A random sum of half waves is added to each signal. Its standard deviation is `scale` times half
-    the width of the bounds, or the larger of the largest and the nominal value without bounds. Free
-    durations are multiplied by exp(scale r / 2), r normal.
+    The others deviate from it by the random waves of `starts_around`, with the spread `scale`.
     """
-    into = discretise(problem, Radau()).on(make_meshes(problem, 50))
-    model, first = problem.spans[0].model, int(scale == NEAR)
-    for seed in range(count):
-        random, begins = np.random.default_rng(seed), [0.0]
-        at, nodes, held = list[Array](), list[Array](), list[Array]()
-        parts = zip(problem.spans, into.meshes, initial_points(into).spans, strict=True)
-        for span, mesh, old in parts:
-            x, u, time = old.nodes, old.u, old.T
-            if seed >= first:
-                x = x + _waves(random, scale, span, model.x, x)(mesh)
-                u = u + _waves(random, scale, span, model.u, u)((mesh[1:] + mesh[:-1]) / 2)
-                time *= float(np.exp(0.5 * scale * random.standard_normal()))
-            time = clipped(time, limits(span.T))
-            at.append(begins[-1] + time * mesh)
-            begins.append(begins[-1] + time)
-            nodes.append(x)
-            held.append(np.hstack([u, u[:, -1:]]))
-        times = np.linspace(0.0, begins[-1], 201)
-        rows = zip((*model.x, *model.u), (*np.hstack(nodes), *np.hstack(held)), strict=True)
-        yield {v.name: np.interp(times, np.concatenate(at), row) for v, row in rows}
-
-
-def _waves(
-    random: np.random.Generator, scale: float, span: Span, group: Sequence[Variable], rows: Array
-) -> Callable[[Array], Array]:
-    """Return random sums of half waves over [0, 1], one row for each variable."""
-
-    def size(v: Variable, row: Array) -> float:
-        low, high = span.boxes[v.name]
-        bounded = isfinite(low) and isfinite(high)
-        return 0.5 * (high - low) if bounded else max(v.nominal, float(np.abs(row).max()))
-
-    sizes = [scale * size(v, row) for v, row in zip(group, rows, strict=True)]
-    a = [random.standard_normal((2, WAVES)) * one / np.sqrt(WAVES) for one in sizes]
-
-    def at(fractions: Array) -> Array:
-        angles = pi * np.arange(1, WAVES + 1)[:, None] * fractions
-        return np.array([one[0] @ np.sin(angles) + one[1] @ np.cos(angles) for one in a])
-
-    return at
+    into, model = discretise(problem, Radau()).on(make_meshes(problem, 50)), problem.spans[0].model
+    first = int(scale != NEAR)
+    for start in starts_around(into, initial_points(into), range(first, first + count), scale):
+        ends = np.cumsum([span.T for span in start.spans])
+        parts = [*zip(into.meshes, start.spans, ends, strict=True)]
+        at = np.concatenate([end - span.T + span.T * mesh for mesh, span, end in parts])
+        rows = np.hstack([np.vstack([s.nodes, np.hstack([s.u, s.u[:, -1:]])]) for s in start.spans])
+        times = np.linspace(0.0, at[-1], 201)
+        names = (v.name for v in (*model.x, *model.u))
+        yield {n: np.interp(times, at, row) for n, row in zip(names, rows, strict=True)}

@@ -188,7 +188,7 @@ class Mechanism(packed.Portable, Showing):
         """Set the bounds of a joint coordinate, its rate `<coordinate>_rate`, or an input.
 
         Optimal control keeps them, `simulate` ends with a `LimitWarning` if they are exceeded, and
-        generated C clips its inputs to them.
+        generated C clips its inputs to them. Absolute coordinates have only the bounds of inputs.
         """
         self.limits[name] = lower, upper
 

@@ -57,7 +57,7 @@ def read_urdf(
     friction is independent of the reactions and adds no unknown; for a joint that turns, read N m
     and rad/s. Use `bearings` for friction caused by reactions. Tags inside `<dynamics>`, as in SDF,
     are read like attributes. If damping or friction is missing, mu_viscous or mu_coulomb of
-    Franka's files has the same meaning.
+    Franka's files, or frictionloss of MuJoCo's, has the same meaning.
 
     `<limit>` sets bounds of positions, rates and inputs, see `Mechanism.limit`; `limits.clear()` of
     the mechanism removes them. Boxes, cylinders and spheres in `<visual>` are drawn in films and
@@ -130,10 +130,7 @@ def read_urdf(
         friction = bearings.get(joint.name) or tag_friction(joint, own, level)
         left += _hang(m, joint, names, places, friction, urdf.zero(joint))
     _couple(m, moved, names)
-    stops = not equals(stop_stiffness, 0.0)
-    _limit(m, moved, names, stops)
-    if stops:
-        _add_stops(m, moved, names, stop_stiffness, stop_dissipation)
+    _limit(m, moved, names, stop_stiffness, stop_dissipation)
     if law is not None and equals(level, 0.0) and not any(joint.friction for joint in moved):
         warnings.warn(
             f"urdf '{urdf.name}': {type(law).__name__} has no effect, because no joint has "
@@ -333,22 +330,14 @@ def _hang(
         yield f"<dynamics> of {joint.kind} joint '{joint.name}'"
 
 
-def _add_stops(
-    m: Mechanism, moved: Iterable[UrdfJoint], names: _Names, k: Scalar, e: Scalar
-) -> None:
-    """Add stops of stiffness k and dissipation e."""
-    for joint in moved:
-        if "lower" in joint.limits:
-            name, ends = names.joints[joint.name], (joint.limits["lower"], joint.limits["upper"])
-            m.force(JointStop(f"stop_{name}", name, *ends, k, e))
-
-
-def _limit(m: Mechanism, moved: Iterable[UrdfJoint], names: _Names, stops: bool) -> None:
-    """Set the bounds of inputs, rates and, without stops, positions."""
+def _limit(m: Mechanism, moved: Iterable[UrdfJoint], names: _Names, k: Scalar, e: Scalar) -> None:
+    """Set the bounds of inputs, rates and positions, or for k > 0 stops instead of the last."""
     for joint in moved:
         name, limits = names.joints[joint.name], joint.limits
-        if "lower" in limits and not stops:
-            low, high = limits["lower"], limits["upper"]
+        low, high = limits.get("lower", 0.0), limits.get("upper", 0.0)
+        if low < high and not equals(k, 0.0):
+            m.force(JointStop(f"stop_{name}", name, low, high, k, e))
+        elif low < high:
             m.limit(name, low if low > -UNLIMITED else -inf, high if high < UNLIMITED else inf)
         if "velocity" in limits:
             m.limit(f"{name}_rate", -limits["velocity"], limits["velocity"])

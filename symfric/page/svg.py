@@ -12,11 +12,13 @@ from math import ceil, floor, isfinite, log10
 from typing import NamedTuple, final
 
 import numpy as np
+from matplotlib.ticker import Locator, LogLocator, MaxNLocator
 
 from symfric.foundation.numeric import Array
 
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
+STEPS = [1.0, 2.0, 2.5, 5.0, 10.0]
+"""Round steps of ticks, up to a power of ten."""
 SMALL, LARGE = 1e-2, 1e5
 """Range of magnitudes for which tick labels have no power of ten."""
 
@@ -64,33 +66,22 @@ class Axis:
     def ticks(self, most: int = 6) -> list[tuple[float, str]]:
         """Return round values inside the range and their labels."""
         if self.logarithmic:
-            return self._decades(most)
-        step = self._step(most)
-        first, last = ceil(self.low / step - 1e-9), floor(self.high / step + 1e-9)
+            powers = self._inside(LogLocator(numticks=most + 1))
+            if len(powers) > 1:
+                names = (str(round(log10(x))).translate(SUPERSCRIPTS) for x in powers)
+                return [(x, f"10{name}") for x, name in zip(powers, names, strict=True)]
+        values = self._inside(MaxNLocator(most, integer=self.whole, steps=STEPS, min_n_ticks=3))
+        step = values[1] - values[0] if len(values) > 1 else 1.0
         digits = max(6, ceil(log10(max(abs(self.low), abs(self.high)) / step)) + 1)
         unit = 10.0**self.power
-        return [(k * step, f"{k * step / unit:.{digits}g}") for k in range(first, last + 1)]
+        return [(x, f"{x / unit:.{digits}g}") for x in values]
 
-    def _step(self, most: int) -> float:
-        """Return the coarsest round step with about `most` ticks, but at least three."""
-        rough = (self.high - self.low) / most
-        decade = 10.0 ** floor(log10(rough))
-        steps = [s * d for d in (decade / 10, decade) for s in STEPS[:-1]] + [10 * decade]
-        coarse = next(s for s in steps if s >= 0.999 * rough)
-        if self.whole:
-            return max(1.0, ceil(coarse))
-        finer = [s for s in steps if s <= coarse and self.high // s - -(-self.low // s) >= 2]
-        return finer[-1] if finer else coarse
-
-    def _decades(self, most: int) -> list[tuple[float, str]]:
-        first, last = ceil(log10(self.low) - 1e-9), floor(log10(self.high) + 1e-9)
-        if last - first < 1:  # less than a decade
-            plain = Axis(self.name, self.unit, self.low, self.high)
-            return [(x, f"{x:.3g}") for x, _ in plain.ticks(most) if x > 0]
-        stride = max(1, ceil((last - first) / most))
-        return [
-            (10.0**k, f"10{str(k).translate(SUPERSCRIPTS)}") for k in range(first, last + 1, stride)
-        ]
+    def _inside(self, locator: Locator) -> list[float]:
+        """Return the values of a locator within the range."""
+        values = np.asarray(locator.tick_values(self.low, self.high))
+        margin = 1e-9 * (self.high - self.low)
+        kept = (values >= self.low - margin) & (values <= self.high + margin)
+        return (values[kept] + 0.0).tolist()
 
 
 MARGIN = 0.05

@@ -27,6 +27,8 @@ RETURNS = 2
 """Number of returns at the end of a run that have to repeat."""
 FLAT = 1e-9
 """Range of a state, relative to its nominal value, below which it counts as constant."""
+SETTLED = 1e-3
+"""Range in the last quarter of a run, relative to that of the whole run, of a steady motion."""
 POINTS = 4096
 """Number of points of a spectrum."""
 
@@ -176,10 +178,12 @@ def cycle(run: Signals, section: ca.SX | None, tolerance: float) -> Cycle:
     late = looks[looks >= (looks[0] + looks[-1]) / 2]
     turning = [n for n in model.angles if np.ptp(run.of(model.expression(n), late)) > 2 * np.pi]
     columns, sizes = list[ca.SX](), list[float]()
+    of_laws, inner = {v.name for c in model.contacts for v in c.states}, list[bool]()
     for v in states:  # an angle that turns returns in its sine and cosine
         turns = v.name in turning
         columns += [ca.sin(v.symbol), ca.cos(v.symbol)] if turns else [v.symbol]
         sizes += [1.0, 1.0] if turns else [v.nominal]
+        inner += [v.name in of_laws] * (1 + turns)
     column, nominal = ca.vertcat(*columns), np.array(sizes)
     values = np.atleast_2d(run.of(column, late)) if states else np.zeros((0, 1))
     ranges = np.ptp(values, axis=1)
@@ -187,13 +191,18 @@ def cycle(run: Signals, section: ca.SX | None, tolerance: float) -> Cycle:
     if not moving.any():
         raise ValueError(f"{where}: expected a run that moves, got one at rest in its second half")
     if section is None:
-        i = int(np.argmax(ranges / nominal))
+        # a bristle may vibrate many times within a period of the machine
+        outer = np.where(moving & ~np.array(inner), ranges / nominal, 0.0)
+        i = int(np.argmax(outer if outer.any() else ranges / nominal))
         section = columns[i] - (values[i].max() + values[i].min()) / 2
     times = crossings(partial(run.of, section), looks, 1)
     if times.size < RETURNS + 1:
+        hint = _steady(run, column) or (
+            "simulate longer, or give an expression that the motion crosses"
+        )
         raise ValueError(
             f"{where}: expected {RETURNS + 1} rising crossings of the section or more, got "
-            f"{times.size}; simulate longer, or give an expression that the motion crosses"
+            f"{times.size}; {hint}"
         )
     at = np.atleast_2d(run.of(column, times))[moving] / ranges[moving, None]
     for n in range(1, min(LONGEST, times.size - RETURNS) + 1):
@@ -205,5 +214,20 @@ def cycle(run: Signals, section: ca.SX | None, tolerance: float) -> Cycle:
     off = np.abs(at[:, 1:] - at[:, :-1]).max(axis=0)[-RETURNS:].max()
     raise ValueError(
         f"{where}: expected a motion that repeats to {tolerance:g} of its range, got one that "
-        f"differs by {off:.2g} between crossings; simulate longer, or raise the tolerance"
+        f"differs by {off:.2g} between crossings; "
+        + (_steady(run, column) or "simulate longer, or raise the tolerance")
+    )
+
+
+def _steady(run: Signals, column: ca.SX) -> str:
+    """Return a hint for a run that has settled to a steady motion; empty for any other run."""
+    looks = run.looks
+    last = looks[looks >= (looks[0] + 3 * looks[-1]) / 4]
+    whole, left = (np.ptp(np.atleast_2d(run.of(column, at)), axis=1) for at in (looks, last))
+    share = float((left / np.maximum(whole, 1e-300)).max())
+    if not share < SETTLED:
+        return ""
+    return (
+        f"in the last quarter the states vary by only {share:.1g} of their range, so the run has "
+        "settled to a steady motion: use equilibrium(), or --from equilibrium"
     )

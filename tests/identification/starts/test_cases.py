@@ -10,7 +10,7 @@ from identification.fit import Fit
 from identification.residuals.points import Points
 from symfric import Dahl
 from symfric.bench.identification_measured import FRANKA, franka
-from symfric.bench.identification_memory import gms
+from symfric.bench.identification_simulated import gms
 
 
 def test_a_raw_file_of_points_takes_three_lines(tmp_path: Path) -> None:

@@ -158,8 +158,6 @@ def test_methods_take_turns() -> None:
     calls = {name: lambda n=name: order.append(n) for name in "ab"}
     assert set(interleaved(calls, rounds=2)) == {"a", "b"}
     assert "".join(order) == "ababab"
-    interleaved(calls, rounds=0, budget=1e-3)
-    assert len(order) > 10
 
 
 @needs_compiler

@@ -20,10 +20,9 @@ from symfric.bench import identification_measured as measured
 from symfric.bench.codegen import PROVEN, plants, trials
 from symfric.bench.identification import files, outcome
 from symfric.bench.identification_files import campaign
-from symfric.bench.identification_memory import ranked
 from symfric.bench.identification_online import Axis, judged
 from symfric.bench.identification_records import ar
-from symfric.bench.identification_repeats import far
+from symfric.bench.identification_simulated import far, ranked
 from symfric.bench.interop import GOAL, ROUTES, STEPS, N, T, missed, move
 from symfric.bench.ocp import controllers
 from symfric.bench.report import GOALS, Row
@@ -201,6 +200,7 @@ def test_the_measured_drive_reaches_the_goals_of_the_closed_loop() -> None:
 
 @on_target
 @pytest.mark.heavy
+@pytest.mark.slow
 def test_cores_are_measured_and_compared_with_the_c_of_casadi(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

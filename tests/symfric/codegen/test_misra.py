@@ -22,7 +22,10 @@ BLOCKS = {
 
 
 @pytest.mark.skipif(shutil.which("cppcheck") is None, reason="cppcheck is not installed")
-@pytest.mark.parametrize("name", BLOCKS)
+@pytest.mark.parametrize(
+    "name", [n if n in ("arrays", "compensator") else pytest.param(n, marks=pytest.mark.slow)
+             for n in BLOCKS],
+)  # fmt: skip
 def test_the_manifest_names_all_deviations(name, tmp_path):
     """The types differ in their names and literals; one block is enough for the other type."""
     real = "double" if name == "arrays" else "float"

@@ -107,8 +107,11 @@ def test_sliding_costs_more_than_a_step_without_load():
 @on_target
 @pytest.mark.heavy
 @pytest.mark.parametrize(
-    ("real", "core"), [("float", "m0plus"), ("float", "m4f"), ("double", "m7"), ("double", "m3")]
-)
+    ("real", "core"),
+    [("float", "m4f"), ("double", "m3"),
+     *(pytest.param(*pair, marks=pytest.mark.slow) for pair in (("float", "m0plus"),
+                                                                ("double", "m7")))],
+)  # fmt: skip
 def test_a_kit_passes_its_own_test(real, core, tmp_path):
     assert wrong_on_target(generate(LuGre(), tmp_path, real=real), real, core) == 0
 

@@ -269,7 +269,7 @@ def test_importing_loads_nothing_heavy(call: str) -> None:
         ("import symfric.integrator.simulate, symfric.scenes.blocks, symfric as sf;"
          "sf.integrator.simulate(sf.scenes.rabinowicz(sf.BrownMcPhee()), 0.1)",
          ("matplotlib", "scipy", "symfric.multibody", "symfric.figures", "concurrent.futures")),
-        ("import symfric.cli.codegen", ("matplotlib",)),
+        pytest.param("import symfric.cli.codegen", ("matplotlib",), marks=pytest.mark.slow),
     ],
     ids=["version", "belt", "C"],
 )  # fmt: skip

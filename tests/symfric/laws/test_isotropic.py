@@ -22,6 +22,8 @@ SUMS: dict[str, sf.Law] = {
 }
 LAWS = {name: law for name, law in (CASES | SUMS).items() if not anisotropy(law)}
 DYNAMIC = [name for name, law in LAWS.items() if law.states and "," not in name]
+"""Dynamic laws without their variants; runs along a path take `SOME` of them."""
+SOME = ("lugre", "gms", "bouc_wen", "leuven", "elasto_plastic", "dahl+gms+viscous")
 RNG = np.random.default_rng(5)
 
 
@@ -103,8 +105,8 @@ REVERSING = 5e-3 * np.sin(2 * pi * 100 * TIMES) + 2e-3 * np.sin(2 * pi * 330 * T
 
 
 def test_straight_slip_with_reversals_is_the_law_itself() -> None:
-    in_space = product(("lugre", "gms", "bouc_wen"), ((2 / 3, -1 / 3, 2 / 3),))
-    for name, direction in (*product(DYNAMIC, ((0.6, -0.8),)), *in_space):
+    in_space = product(SOME[:3], ((2 / 3, -1 / 3, 2 / 3),))
+    for name, direction in (*product(SOME, ((0.6, -0.8),)), *in_space):
         one, e = LAWS[name], np.array(direction)
         law = sf.PlanarSlip(one) if len(e) == 2 else sf.SpatialSlip(one)
         z, F, _ = along_path(name, 0, at_rest(one), REVERSING[None, :])
@@ -132,7 +134,7 @@ ANGLES = 2 * pi * 100 * TIMES
 
 def test_a_closed_circle_takes_energy() -> None:
     """The second of two turns at 100 Hz, of a size below and far above the break-away path."""
-    for name, radius in product(DYNAMIC, (1e-6, 4e-5)):
+    for name, radius in product(SOME, (1e-6, 4e-5)):
         v = 2 * pi * 100 * radius * np.array([np.cos(ANGLES), np.sin(ANGLES)])
         _, F, work = along_path(name, 2, at_rest(sf.PlanarSlip(LAWS[name])), v)
         assert np.isfinite(F).all(), name
@@ -148,7 +150,7 @@ def limits(law: sf.Law) -> np.ndarray:
 
 
 def test_states_never_leave_the_ball_of_their_limit_in_curved_slip() -> None:
-    for name in DYNAMIC:
+    for name in SOME:
         law = sf.PlanarSlip(LAWS[name])
         speed = 8e-3 * np.abs(np.sin(2 * pi * RNG.uniform(20, 120) * TIMES))
         waves = (RNG.uniform(0, 3) * np.sin(2 * pi * f * TIMES + f) for f in (30.0, 110.0, 270.0))

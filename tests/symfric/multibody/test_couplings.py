@@ -62,7 +62,7 @@ def test_screws_need_the_moments_of_the_textbook() -> None:
     m.joints = [replace(m.joints[0], rate=(lead / (2 * pi) * speed, speed))]
     m.constraint(mb.PrescribedMotion("drive", "thread", lambda t: speed * t))
     model, draw = m.build(p=p), np.random.default_rng(1)
-    for _ in range(8):
+    for _ in range(4):
         r, slope, angle = 10 ** draw.uniform(-3, 0), draw.uniform(0.01, 1.0), draw.uniform(0, 0.7)
         load, level, side = 10 ** draw.uniform(-1, 5), 10 ** draw.uniform(-3, -0.2), 1.0
         values = {"lead": 2 * pi * r * tan(slope), "radius": r, "flank": angle, "mass": load / G}
@@ -233,12 +233,12 @@ def check_trains(seeds: range) -> None:
 
 
 def test_random_trains_keep_their_energy() -> None:
-    check_trains(range(4))
+    check_trains(range(2))
 
 
 @pytest.mark.slow
 def test_many_random_trains_keep_their_energy() -> None:
-    check_trains(range(4, 34))
+    check_trains(range(2, 34))
 
 
 @pytest.mark.parametrize(
@@ -273,7 +273,7 @@ def torque(t: Any) -> Any:
 def test_inverse_dynamics_need_the_torque_of_the_run(tmp_path: Path) -> None:
     """The moment that a run was given, for both flanks and left-hand threads, in C as well."""
     laws = BrownMcPhee(mu_s=0.18, mu_d=0.15, v_t=1e-3), LuGreNormalised()
-    for law, lead in ((laws[0], 0.004), (laws[0], -0.02), (laws[1], 0.02)):
+    for law, lead in ((laws[0], -0.02), (laws[1], 0.02)):
         m = jack(law, lead, flank=0.2)
         later = np.linspace(0.2, 1.0, 50)  # the block takes bristles as constant over its step
         run = simulate(m.build(), 1.0, u={"torque": torque}, t_eval=later, rtol=1e-10)
@@ -291,7 +291,7 @@ def test_inverse_dynamics_need_the_torque_of_the_run(tmp_path: Path) -> None:
     assert checked.ok, checked
 
 
-@pytest.mark.heavy
+@pytest.mark.slow
 def test_a_jack_in_an_fmu_moves_as_in_python(tmp_path: Path) -> None:
     model = jack(DRY, 0.02).build()
     export_fmu(model, tmp_path / "jack.fmu", rtol=1e-9, t_end=1.0)

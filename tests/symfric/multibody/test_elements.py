@@ -246,7 +246,11 @@ def test_a_clutch_that_sticks_loses_nothing_and_rest_has_no_efficiency(
     assert mb.efficiency(run, "w") == pytest.approx(expected, abs=1e-9, nan_ok=True)
 
 
-@pytest.mark.parametrize("law", ["exact_coulomb", "brown_mcphee", "lugre_normalised"])
+@pytest.mark.parametrize(
+    "law",
+    ["exact_coulomb", *(pytest.param(law, marks=pytest.mark.slow)
+                        for law in ("brown_mcphee", "lugre_normalised"))],
+)  # fmt: skip
 def test_a_released_element_has_no_friction_and_never_pulls(law: str) -> None:
     def wave(t: ca.SX) -> ca.SX:
         return 50 * ca.sin(2 * pi * t)

@@ -180,7 +180,7 @@ def test_no_element_is_missing_above() -> None:
     "figure",
     [
         lambda: chain(2).schematic(),
-        pytest.param(lambda: chain(16).schematic(), id="chain of 16"),
+        pytest.param(lambda: chain(16).schematic(), marks=pytest.mark.slow),
         lambda: DrillString(LAW, lumps=1).schematic(),
         pytest.param(lambda: DrillString(LAW, lumps=16).schematic(), marks=pytest.mark.slow),
         lambda: FourBar(LAW, crank=1.0, coupler=30.0, rocker=25.0, base=28.0).schematic(),
@@ -194,6 +194,7 @@ def test_schematics_stay_legible_with_other_parameters(figure) -> None:
 
 def test_labels_without_a_free_place_are_omitted(monkeypatch: pytest.MonkeyPatch) -> None:
     complete = chain(8).schematic()
+    check_legible(complete)
     monkeypatch.setattr("symfric.results.schematic.ROOMS", ((20.0, 50.0),))
     crowded = chain(8).schematic()
     check_legible(crowded)

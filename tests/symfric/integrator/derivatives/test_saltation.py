@@ -104,7 +104,7 @@ CASES = {
 }
 
 
-OFTEN = ("leine_belt", "exact_drive", "gms_drive")
+OFTEN = ("leine_belt", "exact_drive", "gms_drive", "maxwell_drive")
 
 
 def run_of(case: str, p: Mapping[str, float], **how: object) -> Trajectory:
