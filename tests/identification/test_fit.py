@@ -189,7 +189,7 @@ def test_processes_side_by_side_agree_to_the_bit(capsys: pytest.CaptureFixture[s
 
 @pytest.mark.parametrize(("N", "mu_s", "v_s", "rate"), [(50, 0.2, 0.05, 1000), (9, 0.3, 0.1, 600)])
 def test_intervals_of_simulated_records_contain_the_truth(
-    N: float, mu_s: float, v_s: float, rate: float
+    N: float, mu_s: float, v_s: float, rate: int
 ) -> None:
     """The acceleration jumps at reversals, where the static level is determined."""
     law = Stribeck(mu_s=mu_s, mu_d=0.15, v_s=v_s)

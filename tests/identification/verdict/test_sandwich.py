@@ -8,8 +8,7 @@ from linear_fits import ar1, coulomb, fitted
 from scipy.stats import t as student
 from tables import sampled
 
-from identification.verdict.colour import Colour, colour, predictors, whitened
-from identification.verdict.minimum import places, positions
+from identification.verdict.colour import Colour, colour, places, positions, predictors, whitened
 
 
 def test_white_noise_gives_the_textbook_covariance() -> None:
