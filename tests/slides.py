@@ -1,5 +1,7 @@
 """Motions of a mass with friction, and runs of estimators on them."""
 
+from functools import cache
+
 import numpy as np
 from one_program import along
 
@@ -28,6 +30,7 @@ def inputs(block: Block, **signals: np.ndarray) -> np.ndarray:
     return np.column_stack([signals.get(v.name, ones) for v in block.inputs])
 
 
+@cache
 def slid(law: sf.Law, n: int, mass: float = 1.0, share: float = 1.0) -> dict[str, np.ndarray]:
     """Motion of a mass at the samples, and the force of the last interval, without noise."""
     random = np.random.default_rng(0)

@@ -165,7 +165,10 @@ LONG = {
 }
 """Whole solves of several seconds; `tests/examples/test_motions.py` checks their problems."""
 
-SLOW = LONG | {"hunting_drive", "mpc_drive", "out_and_back", "press"}
+SLOW = LONG | {
+    *("hardware_in_the_loop", "hunting_drive", "learn_drive", "many_machines", "mpc_drive"),
+    *("out_and_back", "press"),
+}
 CHECKS = dict.fromkeys(LONG, motion_is_verified) | {
     check.__name__: check
     for check in (

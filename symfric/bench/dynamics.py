@@ -244,22 +244,6 @@ def mechanism_branch() -> Iterator[Found]:
 # called with its files fort.2 (constants), fort.3 (start), fort.7 (branch) and fort.8 (solutions).
 
 FOLDER = Path("/usr/lib/auto-07p/lib")
-SOURCE = """
-SUBROUTINE FUNC(NDIM,U,ICP,PAR,IJAC,F,DFDU,DFDP)
-  INTEGER NDIM,ICP(*),IJAC
-  DOUBLE PRECISION U(NDIM),PAR(*),F(NDIM),DFDU(NDIM,*),DFDP(NDIM,*),R
-  R=U(2)-PAR(1)
-  F(1)=U(2)
-  F(2)=-U(1)-TANH(R/{width:e})*(1+0.5D0*EXP(-(R/0.2D0)**2))-0.1D0*R
-END SUBROUTINE
-SUBROUTINE STPNT(NDIM,U,PAR,T)
-  INTEGER NDIM
-  DOUBLE PRECISION U(NDIM),PAR(*),T
-  PAR(1)=0.8D0
-  U(1)=1.0D0+0.5D0*EXP(-16.0D0)+0.08D0
-  U(2)=0
-END SUBROUTINE
-""" + "".join(f"SUBROUTINE {name}\nEND SUBROUTINE\n" for name in ("BCND", "ICND", "FOPT", "PVLS"))
 CONSTANTS = """
 NDIM=2, IPS={ips}, IRS={start}, ILP=1, ICP=[{free}], NTST={mesh}, NCOL=4, IAD=3, ISP=2, ISW=1
 NMX={points}, NPR=1000, MXBF=0, IID=2, ITMX=8, ITNW=5, NWTN=3, JAC=0
@@ -303,7 +287,9 @@ def belt_of_auto(width: float, points: int, mesh: int = 200) -> OfAuto:
     """
     with TemporaryDirectory() as name:
         folder = Path(name)
-        (folder / "belt.f90").write_text(SOURCE.format(width=width).replace("e-", "D-"), "utf-8")
+        source = Path(__file__).with_name("belt.f90").read_text("utf-8")
+        number = f"{width:e}".replace("e-", "D-")
+        (folder / "belt.f90").write_text(source.replace("WIDTH", number), "utf-8")
         objects = map(str, sorted(FOLDER.glob("*.o")))
         call = ["gfortran", "-fopenmp", "-O2", "belt.f90", *objects, "-o", "belt"]
         subprocess.run(call, cwd=folder, check=True, capture_output=True)

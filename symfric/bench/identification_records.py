@@ -73,19 +73,23 @@ def plain(v: Array, mu_d: float, sigma_2: float) -> Array:
     return mu_d * np.sign(v) + sigma_2 * v
 
 
-def bristle(t: Array, v: Array, z: float = 0.0, sigma_0: float = 1e5, sigma_1: float = 300.0,
-            mu_s: float = 28.0, mu_d: float = 20.0, v_s: float = 0.01, sigma_2: float = 200.0
-            ) -> Array:  # fmt: skip
+def bristle(t: Array, v: Array, z: float = 0.0) -> Array:
     """Return the friction of LuGre from the bristle deflection z [m], by exact steps."""
+    sigma_0, sigma_1 = BRISTLE.values()
     h, mean = np.diff(t), (v[1:] + v[:-1]) / 2
-    level = (mu_d + (mu_s - mu_d) * np.exp(-((mean / v_s) ** 2))) / sigma_0
-    decay = np.exp(-np.abs(mean) / level * h)
+
+    def deflection(speed: Array) -> Array:
+        peak = (CURVE["mu_s"] - CURVE["mu_d"]) * np.exp(-((speed / CURVE["v_s"]) ** 2))
+        return (CURVE["mu_d"] + peak) / sigma_0
+
+    decay = np.exp(-np.abs(mean) / deflection(mean) * h)
     path = [z]
-    for keep, end in zip(decay.tolist(), (np.sign(mean) * level).tolist(), strict=True):
+    ends = np.sign(mean) * deflection(mean)
+    for keep, end in zip(decay.tolist(), ends.tolist(), strict=True):
         path.append(end + (path[-1] - end) * keep)
     bent = np.array(path)
-    level = (mu_d + (mu_s - mu_d) * np.exp(-((v / v_s) ** 2))) / sigma_0
-    return sigma_0 * bent + sigma_1 * (v - np.abs(v) / level * bent) + sigma_2 * v
+    rate = v - np.abs(v) / deflection(v) * bent
+    return sigma_0 * bent + sigma_1 * rate + CURVE["sigma_2"] * v
 
 
 def ar(rng: Generator, n: int, rho: float, size: float) -> Array:

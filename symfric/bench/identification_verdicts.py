@@ -39,14 +39,17 @@ class Setup:
             of the model may be called solved.
         fit: function of a random generator that returns the fit.
         truth: parameter -> true value.
-        kept: True if the scene was never used to set a limit.
     """
 
     name: str
     kind: str
     fit: Callable[[Generator], Fit]
     truth: Mapping[str, float]
-    kept: bool = False
+
+    @property
+    def kept(self) -> bool:
+        """True if the scene was never used to set a limit."""
+        return self.name.startswith("kept")
 
 
 def stage(
@@ -79,28 +82,26 @@ def stage(
 
 def points(
     rng: Generator, *, law: Any = "stribeck", friction: Callable[[Array], Array] | None = None,
-    count: int = 80, low: float = 1e-3, noise: float = records.NOISE, kind: Any = None,
-    **given: Any,
+    count: int = 80, **given: Any,
 ) -> Fit:  # fmt: skip
     """Return the fit of a friction curve through means at constant speeds of both directions."""
-    speeds = np.geomspace(low, records.SPEED, count // 2)
+    speeds = np.geomspace(1e-3, records.SPEED, count // 2)
     v = np.concatenate([-speeds[::-1], speeds])
     F = (partial(records.curve, **CURVE) if friction is None else friction)(v)
-    data = Dataset.of(v=v, F=F + noise * rng.standard_normal(v.size), points=True)
-    return Fit(kind or Points(), law, data, **given)
+    data = Dataset.of(v=v, F=F + records.NOISE * rng.standard_normal(v.size), points=True)
+    return Fit(Points(), law, data, **given)
 
 
 def memory(
-    rng: Generator, *, start: float = 0.0, noise: float = 0.3, position: float = 0.0,
-    creeping: bool = False,
-) -> Fit:  # fmt: skip
+    rng: Generator, *, start: float = 0.0, position: float = 0.0, creeping: bool = False
+) -> Fit:
     """Return the fit of LuGre to forces under an imposed motion with reversals.
 
     Args:
         rng: generator of motion and noise.
         start: deflection of the bristles at the first sample, relative to mu_s / sigma_0.
-        noise, position: standard deviations of the noise of force [N] and position [m]; the
-            velocity is the derivative of the noisy position.
+        position: standard deviation of the noise of the position [m], whose derivative is the
+            velocity.
         creeping: only the stiffness is unknown, in slow motion.
     """
     whole = records.motion(rng, 2e-3 if creeping else 0.03, 0.0)
@@ -110,7 +111,7 @@ def memory(
     v = m.v
     if position:
         v = np.gradient(m.x + position * rng.standard_normal(m.x.size), m.t)
-    data = Dataset.of(t=m.t, v=v, F=F + noise * rng.standard_normal(F.size))
+    data = Dataset.of(t=m.t, v=v, F=F + 0.3 * rng.standard_normal(F.size))
     fixed = CURVE | {"sigma_1": BRISTLE["sigma_1"]} if creeping else None
     return Fit(Points(), LuGre(**CURVE, **BRISTLE), data, free=["sigma_0"], fixed=fixed)
 
@@ -155,8 +156,8 @@ simple = partial(fine, law="coulomb+viscous", friction=flat, position=FINEST)
 """Stage with Coulomb and viscous friction, truly and in the model."""
 
 SCENES = (
-    Setup("curve, coulomb+viscous", "right",
-          partial(points, law="coulomb+viscous", friction=flat), PLAIN),
+    Setup("curve, coulomb+viscous", "right", partial(points, law="coulomb+viscous", friction=flat),
+          PLAIN),
     Setup("curve, stribeck", "right", points, CURVE),
     Setup("stage, coulomb+viscous", "right", simple, COULOMB),
     Setup("stage, coulomb+viscous, AR(1) 0.9", "right", partial(simple, rho=0.9), COULOMB),
@@ -175,12 +176,10 @@ SCENES = (
     Setup("stage, position noise 0.1 um", "record", stage, STRIBECK),
     Setup("stage, position noise 1 um", "record", partial(stage, position=1e-6), STRIBECK),
     Setup("stage, position noise 5 um", "record", partial(stage, position=5e-6), STRIBECK),
-    Setup("stage, encoder 5 um", "record", partial(stage, position=0.0,
-          change=records.encoder(5e-6)),
-          STRIBECK),
-    Setup("stage, encoder 20 um", "record", partial(stage, position=0.0,
-          change=records.encoder(2e-5)),
-          STRIBECK),
+    Setup("stage, encoder 5 um", "record",
+          partial(stage, position=0.0, change=records.encoder(5e-6)), STRIBECK),
+    Setup("stage, encoder 20 um", "record",
+          partial(stage, position=0.0, change=records.encoder(2e-5)), STRIBECK),
     Setup("stage, jitter 0.3 ms", "record", partial(stage, change=records.jitter), STRIBECK),
     Setup("stage, delay 2 ms", "record", partial(stage, change=records.delay), STRIBECK),
     Setup("stage, clipped force", "record", partial(stage, change=records.clipped), STRIBECK),
@@ -204,35 +203,30 @@ SCENES = (
           {"sigma_2": CURVE["sigma_2"]}),
     Setup("shooting, no peak in the model", "wrong", partial(shooting, law=PEAK), BLOCK),
     Setup("kept: stage, heavy tails", "right", partial(simple, change=records.heavy_tails),
-          COULOMB, True),
+          COULOMB),
     Setup("kept: stage, asymmetric law", "right",
           partial(simple, law="asymmetric(coulomb+viscous)", friction=records.asymmetric, rho=0.5),
           {"m": M, "mu_d_pos": 22.0 + OFFSET, "mu_d_neg": 20.0 - OFFSET, "sigma_2_pos": 220.0,
-           "sigma_2_neg": 200.0},
-          True),
-    Setup("kept: curve of few points", "right", partial(points, count=30), CURVE, True),
+          "sigma_2_neg": 200.0}),
+    Setup("kept: curve of few points", "right", partial(points, count=30), CURVE),
     Setup("stage, held force", "record", partial(fine, change=records.held), STRIBECK),
     Setup("kept: stage, encoder 1 um, AR(1) 0.7", "record",
-          partial(stage, position=0.0, change=records.encoder(1e-6), rho=0.7), STRIBECK, True),
+          partial(stage, position=0.0, change=records.encoder(1e-6), rho=0.7), STRIBECK),
     Setup("stage, one-sided gain", "wrong", partial(simple, change=records.gained), COULOMB),
     Setup("kept: stage, root of the speed", "wrong", partial(simple, friction=records.root),
-          COULOMB, True),
-    Setup("kept: stage, warming up, coulomb+viscous", "wrong", partial(simple,
-          change=records.warm_up),
-          COULOMB, True),
-    Setup("kept: shooting, missing spring", "wrong", partial(shooting, spring=0.5), BLOCK, True),
+          COULOMB),
+    Setup("kept: stage, warming up, coulomb+viscous", "wrong",
+          partial(simple, change=records.warm_up), COULOMB),
+    Setup("kept: shooting, missing spring", "wrong", partial(shooting, spring=0.5), BLOCK),
     Setup("kept: stage, delay 1 ms, AR(1) 0.7", "record",
-          partial(stage, change=partial(records.delay, late=1e-3), rho=0.7), STRIBECK, True),
-    Setup("kept: bristles, position noise 1 um", "record", partial(memory, position=1e-6), BRISTLE,
-          True),
+          partial(stage, change=partial(records.delay, late=1e-3), rho=0.7), STRIBECK),
+    Setup("kept: bristles, position noise 1 um", "record", partial(memory, position=1e-6), BRISTLE),
     Setup("kept: stage, backlash of the encoder", "record", partial(stage, change=records.backlash),
-          STRIBECK, True),
+          STRIBECK),
     Setup("kept: stage, saturating sensor", "wrong", partial(simple, change=records.saturated),
-          COULOMB,
-          True),
-    Setup("kept: stage, friction of the guide under load", "wrong", partial(simple,
-          change=records.loaded),
-          COULOMB, True),
+          COULOMB),
+    Setup("kept: stage, friction of the guide under load", "wrong",
+          partial(simple, change=records.loaded), COULOMB),
 )  # fmt: skip
 
 

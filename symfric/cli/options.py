@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from symfric import Law, any_from_text, law_from_text, parameters, with_values
+from symfric.cli.app import TEXTS
 from symfric.foundation import checks
 from symfric.foundation.files import check_file
 from symfric.foundation.parameters import check_names, options
@@ -121,12 +122,10 @@ def called_with(text: str, make: Callable[..., Any], values: dict[str, float]) -
 
 
 def changed(command: Callable[..., Any], given: Mapping[str, Any]) -> list[str]:
-    """Return the options of a command that differ from their defaults."""
-    return [
-        f"--{'no-' * (known.default is True)}{name.replace('_', '-')}"
-        for name, known in signature(command).parameters.items()
-        if given[name] != known.default
-    ]
+    """Return the arguments and options of a command that differ from their defaults."""
+    texts = TEXTS["all"] | TEXTS[command.__name__]
+    names = [n for n, p in signature(command).parameters.items() if given[n] != p.default]
+    return [texts[name][0].split()[0].rpartition("/")[2] for name in names]
 
 
 def held_by_file(

@@ -1,6 +1,7 @@
 """C99 and JavaScript text of CasADi's numbers, operations and expressions; comments, templates."""
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -199,25 +200,51 @@ class Expression(NamedTuple):
         return self.text if self.binds >= least else f"({self.text})"
 
 
-@final
-class Writer:
+class Formulas(ABC):
     """Writer of nodes as C formulas, in which other nodes appear by name.
 
     Attributes:
         names: names of nodes.
         logical: for each node, True if it is a bool.
+        real: type of the numbers.
     """
 
     def __init__(self, source: Graph, logical: list[bool], real: Real) -> None:
         self.source, self.logical, self.real = source, logical, real
         self.names: dict[int, str] = {}
-        values = {"zero": 0.0, "one": 1.0, "two": 2.0}
-        self.constants = {name: real.literal(value) for name, value in values.items()}
 
     def expression(self, i: int) -> Expression:
         """Return the value of a node, a bool or a number."""
-        if i in self.names:
-            return Expression(self.names[i], ATOM)
+        return Expression(self.names[i], ATOM) if i in self.names else self.formula(i)
+
+    @abstractmethod
+    def formula(self, i: int) -> Expression:
+        """Return the formula of a node without a name."""
+
+    def number(self, i: int) -> Expression:
+        """Return the value of a node as a number."""
+        return self.expression(i)
+
+    def negation(self, i: int) -> Expression:
+        """Return the negation of a bool."""
+        return Expression(f"!{self.expression(i).within(ATOM)}", SIGN)
+
+    def truth(self, i: int) -> Expression:
+        """Return the value of a node as a bool."""
+        return self.expression(i)
+
+
+@final
+class Writer(Formulas):
+    """Writer of formulas of floating-point numbers."""
+
+    def __init__(self, source: Graph, logical: list[bool], real: Real) -> None:
+        super().__init__(source, logical, real)
+        values = {"zero": 0.0, "one": 1.0, "two": 2.0}
+        self.constants = {name: real.literal(value) for name, value in values.items()}
+
+    def formula(self, i: int) -> Expression:
+        """Return a literal, or the formula of an operation."""
         node = self.source.nodes[i]
         if node.op == ca.OP_CONST:
             text = self.real.literal(node.value)
@@ -245,13 +272,13 @@ class Writer:
         return Expression(f"{value.within(LOGIC)} ? {one} : {zero}", TERNARY)
 
     def negation(self, i: int) -> Expression:
-        """Return the negation of a bool."""
+        """Return the negation of a bool, without `!` where possible."""
         node = self.source.nodes[i]
         if i not in self.names and node.op in OPPOSITE:
             return self._operation(i, OPPOSITE[node.op])
         if i not in self.names and node.op == ca.OP_NOT:
             return self.expression(node.args[0])
-        return Expression(f"!{self.expression(i).within(ATOM)}", SIGN)
+        return super().negation(i)
 
     def truth(self, i: int) -> Expression:
         """Return the value of a node (a bool, or the number 1 or 0) as a bool."""

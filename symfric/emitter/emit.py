@@ -11,11 +11,11 @@ from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from re import fullmatch
-from typing import Protocol, final
+from typing import final
 
 import casadi as ca
 
-from symfric.emitter.c99 import FORMS, FUNCTIONS, Expression, Real, Writer, operation_name
+from symfric.emitter.c99 import FORMS, FUNCTIONS, Formulas, Real, Writer, operation_name
 from symfric.emitter.logic import LOWERED, logical, settled, simplified
 from symfric.emitter.statements import (
     IfStatement,
@@ -48,36 +48,6 @@ class Code:
     calls: Counter[str]
     operations: int
     outside: int
-
-
-class Formulas(Protocol):
-    """Writer of nodes as formulas, such as `Writer`.
-
-    Attributes:
-        names: names of nodes.
-        logical: for each node, True if it is a bool.
-        real: type of the numbers.
-    """
-
-    names: dict[int, str]
-    logical: list[bool]
-    real: Real
-
-    def expression(self, i: int) -> Expression:
-        """Return the value of a node, a bool or a number."""
-        ...
-
-    def number(self, i: int) -> Expression:
-        """Return the value of a node as a number."""
-        ...
-
-    def negation(self, i: int) -> Expression:
-        """Return the negation of a bool."""
-        ...
-
-    def truth(self, i: int) -> Expression:
-        """Return the value of a node as a bool."""
-        ...
 
 
 def emit(

@@ -27,10 +27,11 @@ Only the second branch uses the inner select, which is therefore x.
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from operator import eq, le, lt, ne
+from typing import final
 
 import casadi as ca
 
-from symfric.foundation.graph import SELECT, Graph, Node, merged, pruned
+from symfric.foundation.graph import SELECT, Graph, Node, Nodes, merged, pruned
 
 COMPARISONS = {ca.OP_LT: lt, ca.OP_LE: le, ca.OP_EQ: eq, ca.OP_NE: ne}
 OPPOSITE = {ca.OP_EQ: ca.OP_NE, ca.OP_NE: ca.OP_EQ}
@@ -53,7 +54,7 @@ def simplified(
         conditions: arguments that are bools.
         truths: results that become bools.
     """
-    made, found = _Algebra(conditions), list[int]()
+    made, found = _Algebra(conditions=conditions), list[int]()
     for node in source.nodes:
         found.append(made.of(node, [found[i] for i in node.args]))
     rows = [
@@ -80,13 +81,12 @@ def is_logical(node: Node, before: Sequence[bool], conditions: Collection[int]) 
     return node.op in BOOLEAN
 
 
+@final
 @dataclass
-class _Algebra:
+class _Algebra(Nodes):
     """Unique nodes, and facts about their values."""
 
-    conditions: Collection[int]
-    nodes: list[Node] = field(default_factory=list[Node])
-    known: dict[Node, int] = field(default_factory=dict[Node, int])
+    conditions: Collection[int] = ()
     logical: list[bool] = field(default_factory=list[bool])
     number: list[bool] = field(default_factory=list[bool])
     """True for constants and bools, which are never NaN."""
@@ -120,9 +120,8 @@ class _Algebra:
         if node.op in COMMUTING and node not in self.known:
             swapped = Node(node.op, node.args[::-1])
             node = swapped if swapped in self.known else node
-        place = self.known.setdefault(node, len(self.nodes))
-        if place == len(self.nodes):
-            self.nodes.append(node)
+        place = super().keep(node)
+        if place == len(self.logical):
             self.logical.append(is_logical(node, self.logical, self.conditions))
             self.number.append(self.logical[-1] or self._is_number(node))
         return place
@@ -134,16 +133,6 @@ class _Algebra:
             held = compared.op in (ca.OP_LT, ca.OP_LE) and yes in compared.args
             return self.number[no] and (held or self.number[yes])
         return node.op == ca.OP_CONST or (node.op in TRUTHFUL and self.number[node.args[0]])
-
-    def add(self, op: int, *args: int) -> int:
-        return self.keep(Node(op, args))
-
-    def constant(self, value: float) -> int:
-        return self.keep(Node(ca.OP_CONST, value=value))
-
-    def value(self, i: int) -> float | None:
-        node = self.nodes[i]
-        return node.value if node.op == ca.OP_CONST else None
 
     def truth(self, i: int) -> int:
         """Return a node that is true if a number is not 0: a bool or a constant."""

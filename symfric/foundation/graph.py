@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import final
 
 import casadi as ca
 import numpy as np
@@ -58,17 +59,42 @@ class Graph:
 
 
 @dataclass
-class _Builder:
+class Nodes:
+    """Growing list of nodes without duplicates."""
+
     nodes: list[Node] = field(default_factory=list[Node])
     known: dict[Node, int] = field(default_factory=dict[Node, int])
 
-    def add(self, node: Node) -> int:
-        if node.op == ca.OP_ADD:
-            node = self._if_else(*node.args) or self._if_else(*reversed(node.args)) or node
+    def keep(self, node: Node) -> int:
+        """Return the number of a node, which is appended if it is new."""
         number = self.known.setdefault(node, len(self.nodes))
         if number == len(self.nodes):
             self.nodes.append(node)
         return number
+
+    def add(self, op: int, *args: int, value: float = 0.0) -> int:
+        """Return the number of an operation."""
+        return self.keep(Node(op, args, value=value))
+
+    def constant(self, value: float) -> int:
+        """Return the number of a constant."""
+        return self.keep(Node(ca.OP_CONST, value=value))
+
+    def value(self, i: int) -> float | None:
+        """Return the value of a node; None if it is not a constant."""
+        node = self.nodes[i]
+        return node.value if node.op == ca.OP_CONST else None
+
+
+@final
+@dataclass
+class _Joined(Nodes):
+    """Nodes in which a sum of two halves of a select is the select."""
+
+    def keep(self, node: Node) -> int:
+        if node.op == ca.OP_ADD:
+            node = self._if_else(*node.args) or self._if_else(*reversed(node.args)) or node
+        return super().keep(node)
 
     def _if_else(self, a: int, b: int) -> Node | None:
         """Return the node c ? x : y if a + b is (c ? x : 0) + (!c ? y : 0); else None.
@@ -91,15 +117,15 @@ def graph(function: ca.Function) -> Graph:
             results.
     """
     _check(function)
-    builder = _Builder()
+    builder = _Joined()
 
     def made(k: int, operands: list[int]) -> int:
         op, entry = function.instruction_id(k), function.instruction_input(k)
         if op == ca.OP_INPUT:
-            return builder.add(Node(op, entry=(entry[0], entry[1])))
+            return builder.keep(Node(op, entry=(entry[0], entry[1])))
         if op == ca.OP_CONST:
-            return builder.add(Node(op, value=function.instruction_constant(k)))
-        return builder.add(Node(op, tuple(operands)))
+            return builder.keep(Node(op, value=function.instruction_constant(k)))
+        return builder.keep(Node(op, tuple(operands)))
 
     return pruned(builder.nodes, [tuple(row) for row in walk(function, made)])
 
@@ -134,14 +160,14 @@ def pruned(nodes: Sequence[Node], results: Sequence[tuple[int, ...]]) -> Graph:
 
 def merged(source: Graph, instead: Mapping[int, int]) -> Graph:
     """Return the graph with each node in `instead` replaced by the given earlier node."""
-    builder = _Builder()
+    builder = _Joined()
     number: list[int] = []
     for i, node in enumerate(source.nodes):
         if i in instead:
             number.append(number[instead[i]])
         else:
             args = tuple(number[j] for j in node.args)
-            number.append(builder.add(replace(node, args=args)))
+            number.append(builder.keep(replace(node, args=args)))
     return pruned(builder.nodes, [tuple(number[i] for i in r) for r in source.results])
 
 

@@ -5,7 +5,7 @@ A case is plain data; a file of a few lines reproduces it on other machines.
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field
 from functools import cache
 from pathlib import Path
 from random import Random
@@ -81,32 +81,6 @@ class Case:
         """Return plain data for JSON."""
         return asdict(self)
 
-    @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> "Case":
-        """Return the case for the output of `to_dict`.
-
-        Raises:
-            ValueError: unknown, missing or wrong fields.
-        """
-        known, needed = {item.name for item in fields(cls)}, {"seed", "number", "scene", "law"}
-        if not needed <= data.keys() <= known:
-            raise ValueError(
-                f"case: expected fields among {', '.join(sorted(known))}, got {', '.join(data)}"
-            )
-        content = dict(data)
-        try:
-            content["free"] = tuple(data.get("free", ()))
-            content["inputs"] = {
-                name: Signal(s["kind"], tuple(map(float, s["values"])), tuple(map(float, s["t"])))
-                for name, s in data.get("inputs", {}).items()
-            }
-        except (TypeError, KeyError, AttributeError, ValueError) as error:
-            raise ValueError(f"case: expected what `symfric stress` wrote, {error!r}") from None
-        wrong = [n for n, v in content.items() if not storable.fits(v, storable.hints_of(cls)[n])]
-        if wrong:
-            raise ValueError(f"case: expected what `symfric stress` wrote, got others: {wrong}")
-        return cls(**content)
-
     def write(self, path: str | Path) -> None:
         """Write the file that `symfric stress --case` reads."""
         write_text(path, json.dumps(self.to_dict(), indent=1) + "\n")
@@ -119,14 +93,17 @@ class Case:
             ValueError: the file does not exist, or its content is not a case.
         """
         data = read_json("case", path, "JSON of a case")
-        content = data.get("case", data)
-        if not isinstance(content, dict):
-            raise ValueError(f"case '{path}': expected JSON of a case, got something else")
         try:
-            return cls.from_dict(content)
-        except ValueError as error:
-            text = str(error).removeprefix("case: ")
-            raise ValueError(f"case '{path}': {text}") from None
+            content = dict(data.get("case", data))
+            content["free"] = tuple(content.get("free", ()))
+            content["inputs"] = {
+                name: Signal(s["kind"], tuple(map(float, s["values"])), tuple(map(float, s["t"])))
+                for name, s in content.get("inputs", {}).items()
+            }
+            return cls(**storable.checked(cls, content))
+        except (TypeError, KeyError, AttributeError, ValueError) as error:
+            what = "expected what `symfric stress` wrote, got others"
+            raise ValueError(f"case '{path}': {what}: {error}") from None
 
 
 @final

@@ -116,55 +116,30 @@ class CaseProblem:
         """Return the largest number of attempts of a reference for `run`."""
         return 10 * (run.statistics.steps + run.statistics.rejections) + self.attempts
 
-    def run(
-        self,
-        rtol: float,
-        method: str,
-        *,
-        backend: str = "vm",
-        x0: Mapping[str, float] | None = None,
-        t_eval: NDArray[np.float64] | None = None,
-        **options: Any,
-    ) -> Trajectory:
+    def run(self, rtol: float, method: str, **options: Any) -> Trajectory:
         """Return a run of `simulate` without warnings; errors are those of `simulate`."""
-        times = self.times if t_eval is None else t_eval
+        given: dict[str, Any] = {"x0": self.case.x0, "t_eval": self.times, "backend": "vm"}
+        given |= options
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)
             return simulate(
-                self.model,
-                self.case.t_end,
-                t_start=float(times[0]),
-                t_eval=times,
-                x0=self.case.x0 if x0 is None else x0,
-                u=self.inputs,
-                p=self.p,
-                rtol=rtol,
-                method=method,
-                backend=backend,
-                **options,
-            )
+                self.model, self.case.t_end, t_start=float(given["t_eval"][0]), u=self.inputs,
+                p=self.p, rtol=rtol, method=method, **given,
+            )  # fmt: skip
 
     def attempt(
-        self,
-        rtol: float,
-        method: str,
-        limit: int,
-        x0: Mapping[str, float] | None = None,
-        times: Array | None = None,
+        self, rtol: float, method: str, limit: int, **options: Any
     ) -> Trajectory | SolveError:
         """Return a reference run with short steps, or its error if it fails.
 
         Args:
             rtol, method: as in `simulate`.
             limit: largest number of attempts.
-            x0: start values; by default those of the case.
-            times: times of the results [s]; by default those of the problem.
+            options: further arguments of `run`, by default those of the case.
         """
+        longest = (self.case.t_end - self.case.t_start) / STRIDES
         try:
-            span = self.case.t_end - self.case.t_start
-            return self.run(
-                rtol, method, max_steps=limit, x0=x0, t_eval=times, max_step=span / STRIDES
-            )
+            return self.run(rtol, method, max_steps=limit, max_step=longest, **options)
         except SolveError as error:
             return error
 
@@ -211,18 +186,18 @@ class CaseProblem:
                 if answer is not None and not self.model.events:
                     end = answer.onward(times, start)
                 else:
-                    end = self.onward(times, start, limit)
+                    end = self.onward(times, start, limit, self.third)
                 if end is None:
                     return float("inf")
                 ends.append(end)
             worst = max(worst, float((np.abs(ends[1] - ends[0]) / size).max()))
         return worst
 
-    def onward(self, times: Array, y: Array, limit: int) -> Array | None:
+    def onward(self, times: Array, y: Array, limit: int, method: str) -> Array | None:
         """Return states at `times` of the motion that starts with y; None if the run fails."""
         start = dict(zip((v.name for v in self.model.x), y.tolist(), strict=True))
         try:
-            run = self.attempt(self.case.rtol / 100, self.third, limit, start, times)
+            run = self.attempt(self.case.rtol / 100, method, limit, x0=start, t_eval=times)
         except ValueError:  # these states have no consistent algebraic unknowns
             return None
         return None if isinstance(run, SolveError) else table(run, times)
@@ -243,14 +218,10 @@ class CaseProblem:
             first, last = stretches.pop()
             span = t[[first, last]]
             part = replace(self, case=replace(self.case, t_end=float(span[1])))
-            start = dict(zip((v.name for v in self.model.x), y[:, first].tolist(), strict=True))
-            try:
-                other = part.attempt(self.case.rtol / 100, self.other, limit, start, span)
-            except ValueError:  # these states have no consistent algebraic unknowns
+            end = part.onward(span, y[:, first], limit, self.other)
+            if end is None:
                 return float("inf")
-            if isinstance(other, SolveError):
-                return float("inf")
-            error = float((np.abs(y[:, [last]] - table(other, span[1:])) / size).max())
+            error = float((np.abs(y[:, [last]] - end[:, 1:]) / size).max())
             if error > RIGHT and last - first > 1:
                 middle = (first + last) // 2
                 stretches += [(first, middle), (middle, last)]

@@ -164,7 +164,7 @@ def test_a_fit_of_bristles_at_the_measured_velocity_recommends_simulation() -> N
 SCRIPT = """
 from identification import Filter, Fit, InverseDynamics, synthetic_drive_data
 kind = InverseDynamics(filter=Filter(100.0, 1), dead_time=None)
-data = synthetic_drive_data(speeds=(0.01, 0.05))
+data = synthetic_drive_data(speeds=(0.05,), rate=500.0)
 fit = Fit(kind, "stribeck", data, starts=1).solve(throw=False)
 print(" ".join(e.value.hex() for e in fit.parameters.values()))
 print(" ".join((e.standard_error or 0.0).hex() for e in fit.parameters.values()))
@@ -177,7 +177,7 @@ def test_processes_side_by_side_agree_to_the_bit(capsys: pytest.CaptureFixture[s
     """Whatever the number of threads of BLAS, which divides sums of more than 10 000 rows only."""
     exec(SCRIPT)
     here = capsys.readouterr().out
-    threads = {"OPENBLAS_NUM_THREADS": "4", "OMP_NUM_THREADS": "4"}
+    threads = {"OPENBLAS_NUM_THREADS": "2", "OMP_NUM_THREADS": "2"}
     there = subprocess.run(
         [sys.executable, "-c", SCRIPT], env=os.environ | threads, capture_output=True, text=True,
         check=True,

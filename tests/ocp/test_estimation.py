@@ -164,32 +164,30 @@ def axis(mass: float, v_t: float) -> Model:
 
 
 @pytest.mark.parametrize(
-    ("mass", "v_t", "holds"), [(1.0, 0.01, True), (1.5, 0.01, False), (1.0, 1e-4, False)]
+    ("mass", "v_t", "holds"),
+    [(1.0, 0.01, True), (1.5, 0.01, False), pytest.param(1.0, 1e-4, False, marks=pytest.mark.slow)],
 )
 def test_deviations_hold_unless_the_verdict_says_that_they_do_not(
     mass: float, v_t: float, holds: bool
 ) -> None:
     """Reversals of a regularised law, from positions; then a heavier mass, and a sharper law."""
-    t, errors = 0.01 * np.arange(80 if holds else 120), list[np.ndarray]()
+    t, random = 0.01 * np.arange(120), np.random.default_rng(0)
     plant, believed = axis(mass, v_t), axis(1.0, 0.01)
-    for seed in range(1 + holds):
-        random = np.random.default_rng(seed)
-        push = (8 + 4 * random.random()) * np.sin((3 + 2 * random.random()) * t)
-        load = 0.1 * np.cumsum(random.standard_normal(t.size))
-        u = {"motor": Hold(t, push), "load": Hold(t, load)}
-        true = simulate(plant, t[-1], u=u, t_eval=t)
-        data = {"motor": push, "x": true["x"] + 1e-5 * random.standard_normal(t.size)}
-        found = estimate(
-            believed, data, step=0.01, horizon=8, unknown=["load"],
-            noise={"x": 1e-5, "load": 1.0}, spread={"x": 1e-4, "v": 1e-2, "load": 1.0},
-        )  # fmt: skip
-        assert (found.inconsistent.size == 0) == holds, found.verdict
-        assert ("do not hold" in found.verdict) == (not holds)
-        errors.append((found["v"] - true["v"]) / found.deviations["v"])
+    push = (8 + 4 * random.random()) * np.sin((3 + 2 * random.random()) * t)
+    load = 0.1 * np.cumsum(random.standard_normal(t.size))
+    u = {"motor": Hold(t, push), "load": Hold(t, load)}
+    true = simulate(plant, t[-1], u=u, t_eval=t)
+    data = {"motor": push, "x": true["x"] + 1e-5 * random.standard_normal(t.size)}
+    found = estimate(
+        believed, data, step=0.01, horizon=8, unknown=["load"],
+        noise={"x": 1e-5, "load": 1.0}, spread={"x": 1e-4, "v": 1e-2, "load": 1.0},
+    )  # fmt: skip
+    assert (found.inconsistent.size == 0) == holds, found.verdict
+    assert ("do not hold" in found.verdict) == (not holds)
     if holds:  # deviations contain the errors of the integration, which are not small
+        errors = np.abs(found["v"] - true["v"]) / found.deviations["v"]
         assert 1e-4 < found.step_errors["v"] < 0.1
-        assert np.mean(np.abs(errors) < 2) > 0.9
-        assert np.abs(errors).max() < 6
+        assert np.mean(errors < 2) > 0.9 and errors.max() < 6
 
 
 def test_a_parameter_that_drifts_is_estimated_like_an_unknown_input() -> None:

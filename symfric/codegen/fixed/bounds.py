@@ -32,6 +32,7 @@ from symfric.codegen.fixed.operations import (
     Array,
     Ends,
     bits_of,
+    operand_bits,
 )
 from symfric.emitter.branches import Placed
 from symfric.emitter.logic import COMPARISONS, logical
@@ -55,6 +56,7 @@ class Bounds(NamedTuple):
         hulls: range of each node where it is computed.
         cones: argument of `narrowed`.
         boxes, by_box: boxes (inputs, 2, boxes), and the error of each result in each.
+        fits: True if all integers with their errors are below 2^31.
     """
 
     formats: list[int]
@@ -62,6 +64,7 @@ class Bounds(NamedTuple):
     cones: dict[int, Cone]
     boxes: Array
     by_box: Array
+    fits: bool
 
     @property
     def errors(self) -> Array:
@@ -80,7 +83,7 @@ def analysed(found: Placed, ranges: Mapping[Entry, Hull]) -> Bounds:
         ArithmeticError: a value is not bounded, or a comparison is too sensitive.
     """
     over = _Boxes(found, ranges)
-    idle, best = 0, over.bounds(_grid([*ranges.values()]))
+    idle, best = 0, over.bounds(_grid([*ranges.values()], MOST // len(over.nodes)))
     while idle < PATIENCE:
         level = np.minimum(best.errors, np.finfo(float).max)[:, None]
         split: Mask = np.any(best.by_box >= np.maximum(0.5 * level, np.finfo(float).tiny), axis=0)
@@ -91,24 +94,28 @@ def analysed(found: Placed, ranges: Mapping[Entry, Hull]) -> Bounds:
         new = over.bounds(boxes)
         gain = (new.errors < (1.0 - GAIN) * best.errors).any()
         best, idle = new, 0 if gain else idle + 1
-    if not np.isfinite(best.errors).all():
+    if not best.fits:
         raise ArithmeticError(
-            "a quotient near a zero divisor, or an error above an eighth of the largest value"
+            "a quotient near a zero divisor, an argument beyond the domain of a function, or an "
+            "error above an eighth of the largest value"
         )
     return best
 
 
-def _grid(ranges: Sequence[Hull]) -> Array:
-    """Return boxes (inputs, 2, boxes): the first input in octaves about 0, the others in thirds."""
-    octaves, columns = 2.0 ** np.arange(-24, 1), list[Array]()
-    for k, (low, high) in enumerate(ranges):
-        edges = np.linspace(low, high, 4 if low < high else 2)
-        if k == 0 and low < high:
-            octaves = max(abs(low), abs(high)) * np.concatenate([-octaves, [0.0], octaves])
-            edges = np.unique(np.clip(octaves, low, high))
-        columns.append(np.array([edges[:-1], edges[1:]]))
-    places = np.meshgrid(*(np.arange(c.shape[1]) for c in columns), indexing="ij")
-    return np.array([c[:, k.ravel()] for c, k in zip(columns, places, strict=True)])
+def _grid(ranges: Sequence[Hull], most: int) -> Array:
+    """Return boxes (inputs, 2, boxes): the first input in octaves about 0, the others in thirds.
+
+    The others are halves or whole if this would make more than about `most` boxes.
+    """
+    (low, high), *others = ranges
+    octaves = max(abs(low), abs(high)) * 2.0 ** np.arange(-24, 1)
+    first = np.unique(np.clip([*-octaves, 0.0, *octaves], low, high))
+    parts = next((n for n in (3, 2) if first.size * n ** len(others) <= most), 1)
+    edges = [first, *(np.linspace(*ends, parts + 1) for ends in others)]
+    low, high = (
+        np.meshgrid(*(e[k : e.size - 1 + k] for e in edges), indexing="ij") for k in (0, 1)
+    )
+    return np.array([[a.ravel(), b.ravel()] for a, b in zip(low, high, strict=True)])
 
 
 @final
@@ -147,12 +154,13 @@ class _Boxes:
                 slack = {i: np.maximum(slack[i], 1.01 * needed[i]) for i in slack}
             else:
                 raise ArithmeticError("a comparison whose error grows with itself")
-        for i, own in enumerate(errors):  # integers with their errors stay below 2^31
-            here = executed[self.found.place[i]]
-            if (own[here] * 2.0 ** formats[i] > 2.0 ** (BITS - 3)).any():
-                errors[i] = np.where(here, np.inf, 0.0)
+        fits = not any(
+            (executed[self.found.place[i]] & (own > 2.0 ** (BITS - 3 - formats[i]))).any()
+            for i, own in enumerate(errors)
+            if self.nodes[i].op not in (CLAMP, ca.OP_TANH)
+        )
         by_box = np.array([errors[i] for i in self.results])
-        return Bounds(formats, hulls, self._cones(values, boxes), boxes, by_box)
+        return Bounds(formats, hulls, self._cones(values, boxes), boxes, by_box, fits)
 
     def halved(self, best: Bounds, split: Mask) -> Array:
         """Return the boxes `split`, each halved along the input that reduces the error most."""
@@ -267,9 +275,9 @@ class _Boxes:
 
         for i, node in enumerate(self.nodes):
             error, bits = none, formats[i]
+            at = operand_bits(self.nodes, formats, i)
             if node.op in COMPARISONS:
-                bits = min(formats[j] for j in node.args if self.nodes[j].op != ca.OP_CONST)
-                slack[i] = aligned(node.args[0], bits) + aligned(node.args[1], bits)
+                slack[i] = sum(map(aligned, node.args, at), none)
             elif node.op == ca.OP_CONST:
                 error = aligned(i, bits)
             elif node.op == SELECT:
@@ -283,16 +291,17 @@ class _Boxes:
                 error = np.maximum(*sides) + np.where(wrong, away, 0.0)
             elif node.op in OPERATIONS:
                 kind = OPERATIONS[node.op]
-                at = [{OWN: formats[j], RESULT: bits}.get(kind.at, kind.at) for j in node.args]
-                own = [aligned(j, k) for j, k in zip(node.args, at, strict=True)]
-                ends = [values[j] for j in node.args]
+                own, ends = [*map(aligned, node.args, at)], [values[j] for j in node.args]
                 wide = [(x[0] - d, x[1] + d) for x, d in zip(ends, own, strict=True)]
                 slopes = kind.slopes(node.value, wide[0], wide[-1])
                 parts = [np.where(d > 0.0, s * d, 0.0) for s, d in zip(slopes, own, strict=True)]
-                error = _capped(node.op, node.value, sum(parts, none), own[0])
+                error = np.fmin(sum(parts, none), kind.most(node.value, own[0]))
                 size = np.maximum(*map(np.abs, values[i]))
                 error = error + kind.error(node.value, size) + kind.rounded * 2.0**-bits
-            found.append(np.where(np.isnan(error), np.inf, error))
+                low, high = kind.domain
+                inside = (ends[0][0] >= low) & (ends[0][1] <= high)
+                error = np.where(inside & ~np.isnan(error), error, np.inf)
+            found.append(error)
         return found, slack
 
     def _wrong(self, i: int, slack: Mapping[int, Array], values: Sequence[Ends]) -> Mask:
@@ -316,16 +325,6 @@ class _Boxes:
                 if 0.0 < size < max(map(abs, self.ranges[entry])):
                     cones[i] = entry, size
         return cones
-
-
-def _capped(op: int, value: float, error: Array, own: Array) -> Array:
-    """Return an error, limited by the range of a function, or by a power of the error `own`."""
-    if op in (CLAMP, ca.OP_TANH):
-        return np.minimum(error, 2.0 * (value if op == CLAMP else 1.0))
-    power = 0.5 if op == ca.OP_SQRT else value if op == ca.OP_CONSTPOW else 1.0
-    return (
-        np.where(np.isnan(error), np.inf, np.minimum(error, own**power)) if 0 < power < 1 else error
-    )
 
 
 def _compared(op: int, a: Array, b: Array, c: Array, d: Array, slack: Array) -> tuple[Array, Array]:

@@ -10,90 +10,72 @@ from symfric.codegen.fixed.operations import (
     ALIGN,
     BITS,
     CLAMP,
-    DECAY,
+    FOLLOWED,
     INEXACT,
-    OPERATIONS,
-    OWN,
-    PHI1,
-    PHI2,
     SCALE,
+    operand_bits,
 )
-from symfric.emitter.c99 import ATOM, FORMS, INTEGER, PRODUCT, SIGN, Expression
-from symfric.emitter.logic import COMPARISONS, logical
+from symfric.emitter.c99 import ATOM, FORMS, INTEGER, PRODUCT, SIGN, Expression, Formulas
+from symfric.emitter.logic import logical
 from symfric.foundation.graph import Graph
 
 NAMES = {
     ca.OP_EXP: "exp", ca.OP_TANH: "tanh", ca.OP_SIN: "sin", ca.OP_FABS: "abs", ca.OP_FMIN: "min",
     ca.OP_FMAX: "max",
 }  # fmt: skip
-"""Functions of `fixed.c` whose only arguments are numbers."""
-FOLLOWED = {
-    ca.OP_ATAN: ("atan", BITS), DECAY: ("decay", 25), PHI1: ("phi1", 25), PHI2: ("phi2", 25),
-}  # fmt: skip
-"""Functions whose second argument is the format of the first, and its largest value."""
+"""Functions of `fixed.c` whose arguments are numbers in formats of their own."""
+LARGEST = 2**31 - 1
+"""Largest integer; a greater constant has no effect where it is compared or is a limit."""
 
 
 @final
-class IntegerWriter:
-    """Writer of nodes as formulas of integers in their formats.
+class IntegerWriter(Formulas):
+    """Writer of formulas of integers in the `formats` of their nodes.
 
     Attributes:
-        names: names of nodes.
-        logical: for each node, True if it is a bool.
-        real: type of the numbers.
+        prefix: beginning of the names of the functions of `fixed.c`.
     """
 
     def __init__(self, source: Graph, formats: Sequence[int], prefix: str) -> None:
-        self.source, self.formats, self.prefix = source, formats, prefix
-        self.logical, self.real = logical(source.nodes), INTEGER
-        self.names: dict[int, str] = {}
+        super().__init__(source, logical(source.nodes), INTEGER)
+        self.formats, self.prefix = formats, prefix
 
-    def expression(self, i: int) -> Expression:
-        """Return the value of a node, a bool or an integer in its format."""
-        if i in self.names:
-            return Expression(self.names[i], ATOM)
-        nodes, bits = self.source.nodes, self.formats[i]
-        op, args, value = nodes[i].op, nodes[i].args, nodes[i].value
-        own = [self.formats[j] for j in args]
+    def formula(self, i: int) -> Expression:
+        """Return the formula of a node: a bool, or an integer in its format."""
+        bits, node = self.formats[i], self.source.nodes[i]
+        op, args, value = node.op, node.args, node.value
         if op == ca.OP_CONST:
             return self.at(i, bits)
         if op in (SCALE, INEXACT):
             return self.expression(args[0])
-        if op in COMPARISONS:
-            bits = min(self.formats[j] for j in args if nodes[j].op != ca.OP_CONST)
-        kind = OPERATIONS.get(op)
-        at = own if kind is None or kind.at == OWN else [min(kind.at, bits)] * len(args)
-        if op in COMPARISONS:
-            at = [bits] * len(args)
-        texts = [
+        own, at = [self.formats[j] for j in args], operand_bits(self.source.nodes, self.formats, i)
+        if op == CLAMP:
+            limit = min(ceil(value * 2.0**bits), LARGEST)
+            return self.call("limit", self.expression(args[0]).text, min(bits - own[0], 32), limit)
+        operands = [
             self.expression(j) if self.logical[j] else self.at(j, k)
             for j, k in zip(args, at, strict=True)
         ]
         if op == ALIGN:
-            return texts[0]
+            return operands[0]
         if op in FORMS and op not in (ca.OP_MUL, ca.OP_DIV):
             pattern, binds, needs, _ = FORMS[op]
-            operands = (one.within(least) for one, least in zip(texts, needs, strict=True))
-            return Expression(pattern.format(*operands), binds)
-        x = [one.text for one in texts]
+            texts = (one.within(least) for one, least in zip(operands, needs, strict=True))
+            return Expression(pattern.format(*texts), binds)
+        x = [one.text for one in operands]
         match op:
             case ca.OP_MUL:
                 return self.call("mul", *x, sum(own) - bits)
             case ca.OP_DIV:
                 return self.call("div", *x, bits - own[0] + own[1])
-            case _ if op in FOLLOWED:
-                name, most = FOLLOWED[op]
-                at = min(own[0], most)
-                return self.call(name, self.at(args[0], at).text, at)
             case ca.OP_SQRT:
                 return self.call("sqrt", *x, 2 * bits - own[0])
             case ca.OP_LOG:
-                return self.call("mul", self.call("log2", *x, own[0]).text, 744261118, 56 - bits)
+                return self.call("log", *x, own[0], 56 - bits)
             case ca.OP_CONSTPOW:
                 return self.call("pow", *x, own[0], round(value * 2**24), bits)
-            case _ if op == CLAMP:
-                x, shift = [self.expression(args[0]).text], min(bits - own[0], 32)
-                return self.call("limit", *x, shift, ceil(value * 2.0**bits))
+            case _ if op in FOLLOWED:
+                return self.call(FOLLOWED[op], *x, *at)
             case _:
                 return self.call(NAMES[op], *x)
 
@@ -105,24 +87,12 @@ class IntegerWriter:
         """Return an integer in the format `bits`, rounded if this has fewer bits."""
         node = self.source.nodes[i]
         if node.op == ca.OP_CONST:
-            value = round(node.value * 2.0**bits)
+            value = max(-LARGEST, min(round(node.value * 2.0**bits), LARGEST))
             return Expression(str(value), ATOM if value >= 0 else SIGN)
         shift = self.formats[i] - bits
         if shift > BITS:
             return Expression("0", ATOM)
+        value = self.expression(i)
         if shift > 0:
-            return self.call("round", self.expression(i).text, shift)
-        value = self.number(i)
+            return self.call("round", value.text, shift)
         return value if shift == 0 else Expression(f"{value.within(ATOM)} * {1 << -shift}", PRODUCT)
-
-    def number(self, i: int) -> Expression:
-        """Return the value of a node as an integer."""
-        return self.expression(i)
-
-    def negation(self, i: int) -> Expression:
-        """Return the negation of a bool."""
-        return Expression(f"!{self.expression(i).within(ATOM)}", SIGN)
-
-    def truth(self, i: int) -> Expression:
-        """Return the value of a bool."""
-        return self.expression(i)

@@ -18,6 +18,7 @@ from symfric.codegen.fixed.bounds import Bounds, analysed
 from symfric.codegen.fixed.formulas import IntegerWriter
 from symfric.codegen.fixed.lowered import Hull, lowered, narrowed, recognised
 from symfric.codegen.fixed.operations import bits_of
+from symfric.codegen.guards import STEP_SIZE
 from symfric.codegen.runner import compile_object, compiled, evaluated, run_c
 from symfric.codegen.source import header, source
 from symfric.emitter.branches import placed
@@ -128,9 +129,6 @@ def fixed_point(
     """
     folder = checks.path("fixed point: out", out)
     model = law_block(law, name=name, fold=True, h=h) if isinstance(law, Law) else law
-    if model.parameters:
-        names = ", ".join(v.name for v in model.parameters)
-        raise ValueError(f"fixed point: expected a block without parameters, got {names}")
     own = _ranges(model, ranges)
     entries = {(i, j): own[v.name] for i in (2, 0) for j, v in enumerate(model.groups[GROUPS[i]])}
     found, writer = _analysed(model, entries)
@@ -154,15 +152,20 @@ def fixed_point(
 
 
 def _ranges(block: Block, given: Mapping[str, Hull]) -> dict[str, Hull]:
-    """Return the range of each state and input, limited by its bounds.
+    """Return the range of each state and input of a block, limited by its bounds.
 
     Raises:
-        ValueError: all problems at once.
+        ValueError: all problems at once, with parameters of the block.
     """
     where, variables = f"fixed point '{block.name}'", (*block.states, *block.inputs)
     checks.check_names(f"{where}: ranges", given, [v.name for v in variables])
     missing = [f"{v.name} [{v.unit}]" for v in variables if v.name not in given]
     problems = [f"expected a range of {', '.join(missing)}, got none"] * bool(missing)
+    free = [v.name for v in block.parameters]
+    if STEP_SIZE in free:
+        problems.append("expected a step size, got none; add h, such as 0.001 (--step-size 0.001)")
+    elif free:
+        problems.append(f"expected a block without parameters, got {', '.join(free)}")
     found = dict[str, Hull]()
     for v in variables:
         low, high = given.get(v.name, (0.0, 1.0))
@@ -182,7 +185,7 @@ def _analysed(block: Block, ranges: Mapping[tuple[int, int], Hull]) -> tuple[Bou
     """Return formats and bounds of a step, and the writer of its statements."""
     where = f"fixed point '{block.name}'"
     limits = [max(map(abs, ranges[0, j])) for j in range(len(block.states))]
-    whole = lowered(recognised(block.step, ranges), limits, where)
+    whole = lowered(recognised(block.step), limits, where)
     try:
         first = analysed(placed(whole), ranges)
         whole = narrowed(whole, first.hulls, first.cones)
@@ -312,14 +315,15 @@ def compare(
     """
     model = made.model
     states, given = ([v.name for v in group] for group in (model.states, model.inputs))
-    whole = np.rint(inputs * made.scales(given))
+    ends, scales = np.array([made.ranges[name] for name in given]).T, made.scales(given)
+    whole = np.clip(np.rint(inputs * scales), np.ceil(ends[0] * scales), np.floor(ends[1] * scales))
     with TemporaryDirectory(prefix="symfric-") as folder:
         target = Path(folder) / f"{made.c.name}.o"
         warnings = compile_object(compiler, made.files[1], target)
         rows = run_c(made.c, compiled(made.c, [target], made.folder, compiler), whole)
-    ends = [*states, *model.outputs]
-    found = rows / made.scales(ends)
+    names = [*states, *model.outputs]
+    found = rows / made.scales(names)
     before = np.vstack([np.zeros(len(states)), found[:-1, : len(states)]])
-    expected = evaluated(model.step, before, np.zeros((len(whole), 0)), whole / made.scales(given))
+    expected = evaluated(model.step, before, np.zeros((len(whole), 0)), whole / scales)
     worst = np.abs(found - expected).max(axis=0)
-    return dict(zip(ends, worst.tolist(), strict=True)), warnings
+    return dict(zip(names, worst.tolist(), strict=True)), warnings

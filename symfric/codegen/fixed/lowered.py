@@ -6,13 +6,11 @@ values in between hold the range, and more hold the fraction.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from functools import cache
 from math import exp, frexp
 from typing import final
 
 import casadi as ca
-import numpy as np
 
 from symfric.codegen.fixed.operations import (
     ALIGN,
@@ -27,35 +25,17 @@ from symfric.codegen.fixed.operations import (
 )
 from symfric.emitter.c99 import operation_name
 from symfric.emitter.logic import BOOLEAN, settled
-from symfric.foundation.graph import LEAVES, SELECT, Graph, Node, graph, pruned, rebuild
+from symfric.foundation.graph import LEAVES, SELECT, Graph, Node, Nodes, graph, pruned, rebuild
 from symfric.foundation.numeric import NEAR, exp_phi1_phi2
 
 Hull = tuple[float, float]
+WEIGHTS = (DECAY, PHI1, PHI2)
+"""exp(-x) and its weights, in the order of `exp_phi1_phi2`."""
 
 
 @final
-@dataclass
-class _Builder:
-    """Unique nodes."""
-
-    nodes: list[Node] = field(default_factory=list[Node])
-    known: dict[Node, int] = field(default_factory=dict[Node, int])
-
-    def keep(self, node: Node) -> int:
-        place = self.known.setdefault(node, len(self.nodes))
-        if place == len(self.nodes):
-            self.nodes.append(node)
-        return place
-
-    def add(self, op: int, *args: int, value: float = 0.0) -> int:
-        return self.keep(Node(op, args, value=value))
-
-    def number(self, value: float) -> int:
-        return self.keep(Node(ca.OP_CONST, value=value))
-
-    def value(self, i: int) -> float | None:
-        node = self.nodes[i]
-        return node.value if node.op == ca.OP_CONST else None
+class _Lowered(Nodes):
+    """Unique nodes in the operations of fixed point."""
 
     def product(self, a: int, b: int) -> int:
         """Return a b; powers of two cost nothing, and factors are collected."""
@@ -63,16 +43,16 @@ class _Builder:
         if k is None:
             return self.power(a, b) or self.add(ca.OP_MUL, a, b)
         if (c := self.value(other)) is not None:
-            return self.number(k * c)
+            return self.constant(k * c)
         inner = self.nodes[other]
         if inner.op == ca.OP_MUL and (c := self.value(inner.args[0])) is not None:
-            return self.product(self.number(k * c), inner.args[1])
+            return self.product(self.constant(k * c), inner.args[1])
         if inner.op == SCALE:
-            return self.product(self.number(k * inner.value), inner.args[0])
+            return self.product(self.constant(k * inner.value), inner.args[0])
         if abs(frexp(k)[0]) == 0.5:
             scaled = other if abs(k) == 1.0 else self.add(SCALE, other, value=abs(k))
             return scaled if k > 0 else self.add(ca.OP_NEG, scaled)
-        return self.number(0.0) if k == 0.0 else self.add(ca.OP_MUL, self.number(k), other)
+        return self.constant(0.0) if k == 0.0 else self.add(ca.OP_MUL, self.constant(k), other)
 
     def power(self, a: int, b: int) -> int | None:
         """Return |x|^n for the smooth power x^2 (x^2 + c)^(n/2 - 1), which differs by c^(n/2)."""
@@ -91,13 +71,13 @@ class _Builder:
         """Return a / b; a product as divisor is divided by in turn, as its range is wide."""
         divisor = self.value(b)
         if divisor is not None:
-            return self.product(a, self.number(1.0 / divisor))
+            return self.product(a, self.constant(1.0 / divisor))
         node = self.nodes[b]
         if node.op == ca.OP_MUL:
             first, second = node.args
             return self.quotient(self.quotient(a, first), second)
         if node.op == SCALE:
-            return self.product(self.number(1.0 / node.value), self.quotient(a, node.args[0]))
+            return self.product(self.constant(1.0 / node.value), self.quotient(a, node.args[0]))
         factor = self.nodes[a]
         if factor.op == ca.OP_MUL and self.value(factor.args[0]) is not None:
             return self.product(factor.args[0], self.quotient(factor.args[1], b))
@@ -113,62 +93,62 @@ class _Builder:
             case ca.OP_SQ:
                 return self.product(args[0], args[0])
             case ca.OP_TWICE:
-                return self.product(self.number(2.0), args[0])
+                return self.product(self.constant(2.0), args[0])
             case ca.OP_MUL:
                 return self.product(*args)
             case ca.OP_DIV:
                 return self.quotient(*args)
             case ca.OP_INV:
-                return self.quotient(self.number(1.0), args[0])
+                return self.quotient(self.constant(1.0), args[0])
             case ca.OP_NEG if self.value(args[0]) is not None:
-                return self.number(-self.nodes[args[0]].value)
+                return self.constant(-self.nodes[args[0]].value)
             case ca.OP_EXPM1:
-                return self.add(ca.OP_SUB, self.add(ca.OP_EXP, *args), self.number(1.0))
+                return self.add(ca.OP_SUB, self.add(ca.OP_EXP, *args), self.constant(1.0))
             case ca.OP_SIGN:
-                zero, (x,) = self.number(0.0), args
-                low = self.select(self.add(ca.OP_LT, x, zero), self.number(-1.0), zero)
-                return self.select(self.add(ca.OP_LT, zero, x), self.number(1.0), low)
+                zero, (x,) = self.constant(0.0), args
+                low = self.select(self.add(ca.OP_LT, x, zero), self.constant(-1.0), zero)
+                return self.select(self.add(ca.OP_LT, zero, x), self.constant(1.0), low)
             case ca.OP_IF_ELSE_ZERO:
-                return self.select(args[0], args[1], self.number(0.0))
+                return self.select(args[0], args[1], self.constant(0.0))
             case _ if node.op == SELECT:
                 return self.select(*args)
             case ca.OP_CONSTPOW:
                 return self.add(node.op, args[0], value=self.nodes[args[1]].value)
+            case _ if node.op in WEIGHTS:
+                return self.add(node.op, self.product(self.constant(-node.value), args[0]))
             case _:
                 return self.keep(Node(node.op, tuple(args), node.entry, node.value))
 
 
-POINTS = 2000
-"""Number of points at which a select is compared with functions."""
-
-
-def recognised(function: ca.Function, ranges: Mapping[tuple[int, int], Hull]) -> Graph:
+def recognised(function: ca.Function) -> Graph:
     """Return the graph of a function with the weights of an exponential step as operations.
 
-    `exp_phi1_phi2` selects a series or a quotient by |x| < `NEAR`. A select by such a condition is
-    recognised by its values at random points in the ranges of the inputs, of all orders of
-    magnitude, and becomes the function of -|x| that it equals at all of them.
+    A select by |x| < `NEAR` becomes an operation of |x| if it has the same graph as a result of
+    `exp_phi1_phi2` for x or -x. The value of the node is 1 for x <= 0, and -1 for x >= 0.
     """
-    source, random = graph(function), np.random.default_rng(0)
-    every = Graph(source.nodes, (tuple(range(len(source.nodes))),))
+    source, selects = graph(function), dict[int, list[int]]()
     arguments = [ca.SX.sym("x", function.size1_in(k)) for k in range(function.n_in())]
-    values = ca.Function("values", arguments, rebuild(every, arguments, {}))
-    points = [np.zeros((function.size1_in(k), POINTS)) for k in range(function.n_in())]
-    for (k, row), (low, high) in ranges.items():
-        orders = 2.0 ** random.uniform(-20.0, 0.0, POINTS) * np.where(
-            random.random(POINTS) < 0.5, low, high
-        )
-        points[k][row] = np.clip(orders, low, high)
-    found, nodes = np.array(values(*points)), list(source.nodes)
-    for i, node in enumerate(source.nodes):
-        condition = source.nodes[node.args[0]] if node.op == SELECT else node
-        if condition.op != ca.OP_LT or source.nodes[condition.args[1]].value != NEAR:
-            continue
-        size, yes = condition.args[0], found[node.args[0]] != 0.0
-        for op, own in zip((DECAY, PHI1, PHI2), exp_phi1_phi2(-ca.SX(found[size])), strict=True):
-            alike = np.isclose(found[i], ca.evalf(own).full().ravel(), rtol=1e-9, atol=1e-9)
-            if alike.all() and min(yes.sum(), (~yes).sum()) > 10:
-                nodes[i] = Node(op, (size,))
+    nodes = list(source.nodes)
+    for i, node in enumerate(nodes):
+        if node.op == SELECT and nodes[node.args[0]].op == ca.OP_LT:
+            size, most = (nodes[j] for j in nodes[node.args[0]].args)
+            if size.op == ca.OP_FABS and most.value == NEAR:
+                selects.setdefault(size.args[0], []).append(i)
+    for x, of in selects.items():
+        cut, factor = x, 1.0
+        if nodes[x].op == ca.OP_MUL and nodes[nodes[x].args[0]].op == ca.OP_CONST:
+            cut, factor = nodes[x].args[1], nodes[nodes[x].args[0]].value  # CasADi joins constants
+        y = ca.SX.sym("y")
+        known = {
+            graph(ca.Function("weight", [y], [weight])): Node(op, (x,), value=sign)
+            for sign, product in ((1.0, factor * y), (-1.0, -(factor * y)))
+            for op, weight in zip(WEIGHTS, exp_phi1_phi2(product), strict=True)
+        }
+        (made,) = rebuild(Graph(source.nodes, (tuple(of),)), arguments, {cut: y})
+        for i, weight in zip(of, ca.vertsplit(made), strict=True):
+            own = ca.Function("weight", [y], [weight], {"allow_free": True})
+            if not own.has_free():
+                nodes[i] = known.get(graph(own), nodes[i])
     return Graph(tuple(nodes), source.results)
 
 
@@ -183,7 +163,7 @@ def lowered(source: Graph, limits: Sequence[float], where: str) -> Graph:
     Raises:
         ValueError: operations without counterpart in fixed point; the message names them all.
     """
-    build, found = _Builder(), list[int]()
+    build, found = _Lowered(), list[int]()
     source = settled(source)
     for node in source.nodes:
         found.append(build.made(node, [found[i] for i in node.args]))
@@ -212,7 +192,7 @@ def narrowed(source: Graph, hulls: Sequence[Hull], cones: Mapping[int, Cone]) ->
         cones: function -> the input from which alone its argument follows, and the magnitude of it
             beyond which the function has its limit.
     """
-    build = _Builder()
+    build = _Lowered()
 
     @cache
     def made(i: int, cone: Cone | None) -> int:
@@ -228,11 +208,11 @@ def narrowed(source: Graph, hulls: Sequence[Hull], cones: Mapping[int, Cone]) ->
         limit, shift = LIMITS[op], 0.0
         if op == ca.OP_EXP and high > 0.0:  # exp(x) = exp(high) exp(x - high)
             shift = high
-            x = build.add(ca.OP_SUB, x, build.number(high))
+            x = build.add(ca.OP_SUB, x, build.constant(high))
         if max(abs(low - shift), abs(high - shift)) > limit:
             x = build.add(CLAMP, x, value=limit)
         found = build.add(op, x)
-        return build.product(build.number(exp(shift)), found) if shift else found
+        return build.product(build.constant(exp(shift)), found) if shift else found
 
     rows = [tuple(made(i, None) for i in row) for row in source.results]
     return pruned(build.nodes, rows)

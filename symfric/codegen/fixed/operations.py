@@ -1,13 +1,16 @@
 """Operations of fixed-point C: ranges, sensitivities, errors and formats."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from math import ceil, e, log, log2, pi
+from math import ceil, e, inf, log, log2, pi
 from typing import Any, final
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
+
+from symfric.emitter.logic import COMPARISONS
+from symfric.foundation.graph import Node
 
 CLAMP, ALIGN, SCALE, INEXACT, DECAY, PHI1, PHI2 = range(-2, -9, -1)
 """Operations without counterpart in CasADi: clamp to +-value, change of format, product with a
@@ -44,18 +47,22 @@ class Operation:
     Attributes:
         ends: function (value of the node, x, y) -> range.
         slopes: function (value, x, y) -> largest derivative by each argument.
-        at: fractional bits of the arguments, or `OWN`, or `RESULT`.
+        at: fractional bits of the arguments, or `OWN`, or `RESULT`; at most, for `FOLLOWED`.
         bits: fractional bits of the result; `OWN` if its range defines them.
+        most: function (value, error of the first argument) -> largest error that this may cause.
         error: function (value, largest magnitude) -> error of the function.
         rounded: error of the result in its last bit.
+        domain: arguments for which the C is correct.
     """
 
     ends: Callable[[float, Ends, Ends], Ends]
     slopes: Callable[[float, Ends, Ends], tuple[Part, ...]] = _one
     at: int = OWN
     bits: int = OWN
+    most: Callable[[float, Array], Part] = lambda _, __: inf
     error: Callable[[float, Array], Part] = lambda _, __: 0.0
     rounded: float = 0.0
+    domain: tuple[float, float] = (-inf, inf)
 
 
 def bits_of(size: float) -> int:
@@ -102,8 +109,10 @@ def _power(n: float, x: Ends, _: Ends) -> Ends:
 
 
 def _power_error(n: float, size: Array) -> Array:
-    quantised = abs(n - round(n * 2**24) / 2**24)
-    return size * (abs(n) * LOG2 * log(2.0) + POWER + 22.0 * quantised) + quantised / (e * abs(n))
+    """Return the error of s = x^n; an error d of n causes d s |log x| = (d / |n|) s |log s|."""
+    quantised = abs(n - round(n * 2**24) / 2**24) / abs(n)
+    own = abs(n) * LOG2 * log(2.0) + POWER + quantised * np.log(np.maximum(size, 1.0))
+    return size * own + quantised / e
 
 
 def _monotone(function: Callable[[Array], Array]) -> Callable[[float, Ends, Ends], Ends]:
@@ -134,7 +143,7 @@ def _decay(order: int, error: float) -> Operation:
     return Operation(
         lambda _, x, __: (_weight(x[1], order), _weight(x[0], order)),
         lambda _, x, __: (np.minimum(_weight(x[0], order), steepest),),
-        25, 30, lambda _, __: error,
+        25, 30, error=lambda _, __: error, domain=(0.0, 2.0**29),
     )  # fmt: skip
 
 
@@ -159,34 +168,50 @@ OPERATIONS: dict[int, Operation] = {
     INEXACT: Operation(lambda _, x, __: x, error=lambda error, _: error),
     CLAMP: Operation(
         lambda most, x, _: (np.clip(x[0], -most, most), np.clip(x[1], -most, most)),
-        at=RESULT, rounded=1.0,
+        at=RESULT, most=lambda most, _: 2.0 * most, rounded=1.0,
     ),
     ca.OP_EXP: Operation(
-        _monotone(np.exp), lambda _, x, __: (np.exp(x[1]),), 25, 30, lambda _, __: EXP
+        _monotone(np.exp), lambda _, x, __: (np.exp(x[1]),), 25, 30, error=lambda _, __: EXP
     ),
     DECAY: _decay(0, EXP),
     PHI1: _decay(1, WEIGHT),
     PHI2: _decay(2, WEIGHT),
     ca.OP_TANH: Operation(
         _monotone(np.tanh), lambda _, x, __: (1.0 - np.tanh(_least(x)) ** 2,),
-        26, 30, lambda _, __: TANH,
+        26, 30, lambda _, __: 2.0, error=lambda _, __: TANH,
     ),
-    ca.OP_SIN: Operation(_sine, at=28, bits=30, error=lambda _, __: SIN),
+    ca.OP_SIN: Operation(_sine, at=28, bits=30, error=lambda _, __: SIN, domain=(-4.0, 4.0)),
     ca.OP_ATAN: Operation(
         _monotone(np.arctan), lambda _, x, __: (1.0 / (1.0 + _least(x) ** 2),),
-        OWN, 29, lambda _, __: ATAN,
+        30, 29, error=lambda _, __: ATAN, domain=(-(2.0**29), 2.0**29),
     ),
     ca.OP_SQRT: Operation(
         lambda _, x, y: _power(0.5, x, y), lambda _, x, __: (0.5 / np.sqrt(_positive(x[0])),),
-        rounded=1.0,
+        most=lambda _, error: error**0.5, rounded=1.0, domain=(0.0, inf),
     ),
     ca.OP_LOG: Operation(
         _monotone(lambda x: np.log(_positive(x))), lambda _, x, __: (1.0 / _positive(x[0]),),
-        error=lambda _, size: LOG2 + 2e-9 * size, rounded=0.5,
+        error=lambda _, size: LOG2 + 2e-9 * size, rounded=0.5, domain=(0.0, inf),
     ),
     ca.OP_CONSTPOW: Operation(
         _power, lambda n, x, y: (abs(n) * _power(n - 1.0, x, y)[1],),
-        error=_power_error, rounded=0.5,
+        most=lambda n, error: error**n if 0.0 < n < 1.0 else inf, error=_power_error,
+        rounded=0.5, domain=(0.0, inf),
     ),
 }  # fmt: skip
 """Operations of numbers."""
+FOLLOWED = {ca.OP_ATAN: "atan", DECAY: "decay", PHI1: "phi1", PHI2: "phi2"}
+"""Functions of `fixed.c` whose second argument is the format of the first."""
+
+
+def operand_bits(nodes: Sequence[Node], formats: Sequence[int], i: int) -> list[int]:
+    """Return the fractional bits in which the C of a node takes its arguments."""
+    node, own = nodes[i], [formats[j] for j in nodes[i].args]
+    if node.op in COMPARISONS:
+        return [min(formats[j] for j in node.args if nodes[j].op != ca.OP_CONST)] * 2
+    at = OPERATIONS[node.op].at if node.op in OPERATIONS else OWN
+    if at == OWN:
+        return own
+    if node.op in FOLLOWED:
+        return [min(at, own[0])]
+    return [formats[i] if at == RESULT else at] * len(own)

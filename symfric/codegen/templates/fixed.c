@@ -294,17 +294,23 @@ static int32_t @{name}_sin(int32_t x)
 }
 
 /* log2(x / 2^fraction) 2^26 for x > 0 */
-static int32_t @{name}_log2(int32_t x, int fraction)
+static int64_t @{name}_log2(int32_t x, int fraction)
 {
     const int zeros = @{name}_zeros((uint32_t)x | 1u);
     const int32_t part = @{name}_table(@{name}_logarithms, ((uint32_t)x << zeros) & 0x7FFFFFFFu);
-    return (31 - zeros - fraction) * 0x4000000 + @{name}_round(part, 4);
+    return (int64_t)(31 - zeros - fraction) * 0x4000000 + @{name}_round(part, 4);
+}
+
+/* log(x / 2^fraction) 2^(56 - shift) for x > 0, rounded. */
+static int32_t @{name}_log(int32_t x, int fraction, int shift)
+{
+    return (int32_t)((@{name}_log2(x, fraction) * 744261118 + ((int64_t)1 << (shift - 1))) >> shift);
 }
 
 /* (x / 2^from)^(power / 2^24) 2^to for x >= 0 */
 static int32_t @{name}_pow(int32_t x, int from, int32_t power, int to)
 {
-    return x <= 0 ? 0 : @{name}_exp2((int64_t)@{name}_log2(x, from) * power, 50, to);
+    return x <= 0 ? 0 : @{name}_exp2(@{name}_log2(x, from) * power, 50, to);
 }
 
 /* sqrt(x 2^shift), bit by bit */

@@ -200,6 +200,7 @@ def test_the_measured_drive_reaches_the_goals_of_the_closed_loop() -> None:
 
 @on_target
 @pytest.mark.heavy
+@pytest.mark.slow
 def test_cores_are_measured_and_compared_with_the_c_of_casadi(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

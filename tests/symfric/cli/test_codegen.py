@@ -81,6 +81,7 @@ def test_a_law_becomes_integers(symfric) -> None:
         line: "expected a range of v [m/s], got none",
         f"{line} --range v=1": "--range v=LOW:HIGH: expected a finite number",
         f"{line} --no-guards": "--real fixed: expected none of --no-guards",
+        "codegen --mpc p.py --range v=0:1 --out c": "in addition, got --range",
         "codegen gms --range v=0:1 --estimator kalman --out c": "expected none of --estimator",
     }.items():
         assert text in symfric(given, 2).err

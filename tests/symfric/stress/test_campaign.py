@@ -129,11 +129,14 @@ def test_a_file_restores_its_case(tmp_path: Path) -> None:
     [
         ("{", "expected JSON of a case"),
         ("[1]", "expected JSON of a case, got something else"),
-        ('{"seed": 1}', "case '.*case.json': expected fields among"),
-        ('{"case": [1]}', "case '.*case.json': expected JSON of a case, got something else"),
-        ('{"seed": 1, "number": 2, "scene": "a", "law": "b", "x": 1}', "expected fields"),
+        ('{"seed": 1}', "case '.*case.json': .* others: Case: expected number, got none"),
+        ('{"case": [1]}', "case '.*case.json': expected what `symfric stress` wrote"),
+        ('{"seed": 1, "number": 2, "scene": "a", "law": "b", "x": 1}', "its fields, got x"),
         ('{"seed": 1, "number": 2, "scene": "a", "law": "b", "inputs": {"c": 1}}', "stress` wrote"),
-        ('{"seed": "1", "number": 2, "scene": "a", "law": "b"}', "got others: .'seed'."),
+        (
+            '{"seed": "1", "number": 2, "scene": "a", "law": "b"}',
+            "others: Case.seed: expected .*int.*, got '1'",
+        ),
     ],
 )
 def test_a_file_of_something_else_is_refused(tmp_path: Path, text: str, message: str) -> None:

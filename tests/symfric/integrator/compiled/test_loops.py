@@ -8,11 +8,15 @@ import pytest
 
 from symfric import BrownMcPhee
 from symfric.bench.multibody import chain, integrator
+from symfric.foundation.instructions import CODES, OPERATIONS, UNARY
+from symfric.foundation.numeric import applied
 from symfric.integrator.compiled import loops
 from symfric.integrator.compiled.columns import Columns, rows_source
 
 N = 240
 """Number of repetitions."""
+NAMES = sorted({*OPERATIONS} - {"erfinv"})
+"""Operations of which C has all."""
 Terms = Callable[[ca.SX, ca.SX, ca.SX, int], ca.SX]
 
 
@@ -40,6 +44,14 @@ def changing(x: ca.SX, before: ca.SX, u: ca.SX, k: int) -> ca.SX:
     return smooth(x, before, u, k) if k not in (100, 101, 150) else ca.tanh(x + before * u)
 
 
+def every(x: ca.SX, before: ca.SX, u: ca.SX, k: int) -> ca.SX:
+    """One operation of CasADi after the other, comparisons, and an infinite constant."""
+    name = NAMES[k % len(NAMES)]
+    made = applied(CODES[name], (x,) if name in UNARY else (x, before))
+    low = ca.fmin(u, -ca.inf if k == 7 else 0.1 * k)
+    return ca.if_else(ca.logic_and(ca.fabs(made) < 3.0, made < ca.inf), made, u * x) + low
+
+
 ORDERS = {
     "in order": [*range(N)],
     "reversed": [*range(N)][::-1],
@@ -49,8 +61,9 @@ ORDERS = {
 
 @pytest.mark.parametrize(
     ("terms", "order"),
-    [(smooth, "in order"), (smooth, "reversed"), (numbered, "shuffled"), (changing, "reversed")],
-)
+    [(smooth, "in order"), (smooth, "reversed"), (numbered, "shuffled"), (changing, "reversed"),
+     (every, "in order")],
+)  # fmt: skip
 def test_loops_have_the_bits_of_the_virtual_machine(terms: Terms, order: str) -> None:
     columns = Columns(recursion(terms, ORDERS[order]))
     rng = np.random.default_rng(0)
