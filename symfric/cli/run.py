@@ -1,8 +1,5 @@
 """`symfric run` and `symfric report`: simulate a scene with one friction law or several."""
 
-import os
-import shlex
-import sys
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import fields
 from functools import partial
@@ -143,10 +140,8 @@ def report(
             throw=False, progress=tell,
         ),
     )  # fmt: skip
-    # in the C locale, Python represents bytes that it cannot decode as lone surrogates
-    command = os.fsencode(shlex.join(["symfric", *sys.argv[1:]])).decode(errors="replace")
     values = {name: parameters(machine) for name, machine in machines.items()}
-    write_report(found, html, settings=values, command=command)
+    write_report(found, html, settings=values, command=output.command_line())
     output.say_written(html)
     refuse_failed(found.values())
 
