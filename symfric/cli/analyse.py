@@ -69,12 +69,11 @@ def analyse(
             branches = [rest]
             for hopf in rest.located("Hopf"):
                 branches.append(orbits_from(rest, hopf, (low, high), points=points, step=longest))
-    if plot:
-        branches[0].plot(own, *branches[1:], path=plot)
-    if save:
-        branches[-1].save(save)
     content = {"scene": scene, "law": law[0], "branches": [b.to_dict() for b in branches]}
-    output.finish(content, json, partial(_show, branches), plot, save)
+    draw = partial(branches[0].plot, own, *branches[1:])
+    output.finish(
+        content, json, partial(_show, branches), (plot, draw), (save, branches[-1].save)
+    )  # fmt: skip
 
 
 def _range(text: str) -> tuple[str, float, float]:
