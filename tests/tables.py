@@ -1,11 +1,23 @@
-"""Tables of cases in TOML files, whose texts are Python expressions of public names."""
+"""Tables of cases: samples, and TOML files whose texts are Python expressions of public names."""
 
 import tomllib
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 import symfric
 from symfric import codegen, compensation, embedded, laws, scenes
+
+
+def sampled(cases: Iterable[Any], of: int) -> list[Any]:
+    """Parameters of a test: the first of every `of` cases, the others as slow tests."""
+    return [
+        pytest.param(*(case if isinstance(case, tuple) else (case,)), marks=marks)
+        for number, case in enumerate(cases)
+        for marks in [[pytest.mark.slow] * (number % of > 0)]
+    ]
 
 
 def table(test: str, name: str = "cases") -> dict[str, Any]:

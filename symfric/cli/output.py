@@ -3,6 +3,7 @@
 import json
 import math
 import os
+import shlex
 import sys
 from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from contextlib import contextmanager
@@ -162,3 +163,9 @@ def say_written(*paths: str | Path | None) -> None:
     names = [str(path) for path in paths if path is not None and str(path) != "-"]
     if names:
         note(f"wrote {', '.join(names)}")
+
+
+def command_line() -> str:
+    """Return the command line of this process as one text, for pages."""
+    # in the C locale, Python represents bytes that it cannot decode as lone surrogates
+    return os.fsencode(shlex.join(["symfric", *sys.argv[1:]])).decode(errors="replace")

@@ -79,7 +79,7 @@ def test_problems_of_pages_are_found_and_good_pages_pass(
 
 
 @needs_browser
-@pytest.mark.heavy
+@pytest.mark.slow
 def test_the_search_must_find_something(tmp_path: Path) -> None:
     from playwright.sync_api import sync_playwright  # noqa: PLC0415
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scripts import evaluated, in_python, misses, needs_browser, opened
+from tables import sampled
 
 from docs.machine import sliders
 from docs.machine.sliders import MOST, SHARED, SMALL, slider, steady, written
@@ -51,13 +52,7 @@ def test_the_force_in_the_browser_is_that_of_python(name, page):
 
 
 @needs_browser
-@pytest.mark.parametrize(
-    "name",
-    [
-        pytest.param(name, marks=[pytest.mark.slow] * (number % 6 > 0))
-        for number, name in enumerate(ALL_LAWS)
-    ],
-)
+@pytest.mark.parametrize("name", sampled(ALL_LAWS, of=6))
 def test_steps_in_the_browser_are_those_of_python(name, page):
     law, rng = ALL_LAWS[name](), np.random.default_rng(0)
     others = {i.name for i in law.inputs}

@@ -5,6 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from tables import sampled
 
 from identification.data.dataset import Dataset
 from identification.data.filters import Filter
@@ -75,8 +76,10 @@ def test_the_correction_removes_the_bias_of_a_wide_filter() -> None:
     assert abs(exact - corrected) < 0.25 * (exact - plain)
 
 
-@pytest.mark.parametrize("given", [(0, 0.006), "auto"])
-@pytest.mark.parametrize("late", [0.002, -0.002, 0.0])
+@pytest.mark.parametrize(
+    ("late", "given"),
+    sampled([(0.002, (0, 0.006)), (0.0, "auto"), (-0.002, "auto"), (-0.002, (0, 0.006))], of=2),
+)
 def test_a_force_recorded_late_or_early(late: float, given: tuple[float, float] | str) -> None:
     data = drive(stage()[1], 0, late)
     fit = Fit(InverseDynamics(dead_time=given), "stribeck", data, starts=1).solve()

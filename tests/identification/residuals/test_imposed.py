@@ -2,6 +2,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from fits import evaluated
+from tables import sampled
 
 from identification.data.dataset import Dataset
 from identification.residuals.evaluation import Evaluation
@@ -47,16 +48,19 @@ SOFT = LuGre(mu_s=0.4, mu_d=0.3, v_s=0.02, sigma_0=500.0, sigma_1=0.5, sigma_2=0
 
 @pytest.mark.parametrize(
     ("law", "limit"),
-    [
-        (SOFT, 3e-5),
-        (LuGre(mu_s=0.4, mu_d=0.3, v_s=0.02, sigma_0=1e5, sigma_1=50.0), 2e-3),
-        (Dahl(mu_d=0.1, sigma_0=1e3), 1e-6),
-        (BoucWen(), 1e-2),
-        (GMS(), 2e-2),
-        (law_from_text("maxwell_slip"), 5e-3),
-        (law_from_text("rate_and_state"), 1e-3),
-        (law_from_text("armstrong"), 5e-3),
-    ],
+    sampled(
+        [
+            (LuGre(mu_s=0.4, mu_d=0.3, v_s=0.02, sigma_0=1e5, sigma_1=50.0), 2e-3),
+            (SOFT, 3e-5),
+            (GMS(), 2e-2),
+            (BoucWen(), 1e-2),
+            (law_from_text("armstrong"), 5e-3),
+            (law_from_text("maxwell_slip"), 5e-3),
+            (Dahl(mu_d=0.1, sigma_0=1e3), 1e-6),
+            (law_from_text("rate_and_state"), 1e-3),
+        ],
+        of=2,
+    ),
 )
 def test_a_law_under_imposed_velocity_is_the_law_simulated(law: Law, limit: float) -> None:
     numeric = subject(law, points=True, moving=True).law

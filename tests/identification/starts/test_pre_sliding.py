@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tables import sampled
 
 from identification.starts.experiments import break_away
 from identification.starts.maxwell_slip import SlipElements, _merged, fit_elements, stretches
@@ -35,7 +36,7 @@ def test_stiffness_of_a_bristle_and_of_an_elastic_element_with_noise() -> None:
     assert hysteresis(Measured(V, np.sign(V))) is None
 
 
-@pytest.mark.parametrize("noise", [0.0, 0.02])
+@pytest.mark.parametrize("noise", sampled([0.0, 0.02], of=2))
 def test_elements_are_found_with_their_radii(noise: float) -> None:
     radii, k = np.array([3e-7, 1.1e-6, 2.9e-6, 8e-6]), np.array([9e5, 3e5, 8e4, 3e4])
     F = stretches(X, radii)[0] @ k
@@ -83,7 +84,7 @@ def test_break_away_of_ramps_and_how_it_depends_on_their_rate() -> None:
         assert same.per_decade is None and same.level == pytest.approx(2.0, abs=1e-12)
 
 
-@pytest.mark.parametrize("loaded", [1, -1])
+@pytest.mark.parametrize("loaded", sampled([-1, 1], of=2))
 def test_a_record_may_begin_with_all_elements_slipping(loaded: int) -> None:
     radii, k = np.array([3e-7, 2.9e-6]), np.array([9e5, 8e4])
     measured = Measured(V, stretches(X, radii, loaded)[0] @ k, X, T)

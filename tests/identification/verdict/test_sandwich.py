@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from linear_fits import ar1, coulomb, fitted
 from scipy.stats import t as student
+from tables import sampled
 
 from identification.verdict.colour import Colour, colour, predictors, whitened
 from identification.verdict.minimum import places, positions
@@ -41,7 +42,7 @@ def test_coloured_covariance_is_that_of_its_autocovariance() -> None:
     np.testing.assert_allclose(again.coloured, B.T @ sigma @ B, rtol=1e-6)
 
 
-@pytest.mark.parametrize("rho", [0.0, 0.9])
+@pytest.mark.parametrize("rho", sampled([0.9, 0.0], of=2))
 def test_values_of_any_size_keep_their_freedom(rho: float) -> None:
     """Squares of their variances would overflow, or vanish."""
     made = fitted(coulomb(300), ar1(300, rho, 3))

@@ -8,6 +8,7 @@ import pytest
 from backends import needs_compiler
 from cortex import on_target
 from receding import controller, linear_model, positioning, rubbing
+from tables import sampled
 
 from ocp.formulation.expressions import effort, track
 from ocp.formulation.phase import Phase
@@ -41,7 +42,7 @@ CONTROLLERS = {
 }
 
 
-@pytest.mark.parametrize("name", CONTROLLERS)
+@pytest.mark.parametrize("name", sampled(CONTROLLERS, of=2))
 def test_float_is_verified_with_half_the_memory(name: str, tmp_path: Path) -> None:
     made = CONTROLLERS[name]()
     found = made.to_c(tmp_path, "float").verify()

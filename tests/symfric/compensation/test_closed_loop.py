@@ -11,6 +11,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from one_program import OneProgram, Stepper, has_bits, is_near, jobs_of
+from tables import sampled
 
 import symfric as sf
 from symfric.codegen import Block
@@ -323,7 +324,7 @@ BLOCKS = [
 
 
 @pytest.mark.heavy
-@pytest.mark.parametrize("real", ["double", "float"])
+@pytest.mark.parametrize("real", sampled(["double", "float"], of=2))
 def test_c_agrees_with_casadi_and_stays_finite(real, compiler, tmp_path):
     program = OneProgram(BLOCKS, tmp_path, compiler, real=real)
     if real == "double":

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from law_cases import CASES
 from one_program import Stepper, block_of
+from tables import sampled
 
 import symfric as sf
 from symfric.codegen import law_block
@@ -102,11 +103,8 @@ def test_without_a_load_there_is_no_force_until_it_returns(law: sf.Law, terms) -
         assert low < [go(v_ref=1e-3, N=load) for _ in range(steps)][-1] < high
 
 
-EACH = [pytest.param(n, marks=[pytest.mark.slow] * (k % 4 > 0)) for k, n in enumerate(CASES)]
-
-
 @pytest.mark.heavy
-@pytest.mark.parametrize("name", EACH)
+@pytest.mark.parametrize("name", sampled(CASES, of=6))
 def test_the_terms_of_every_law_add_up_to_its_force(name: str) -> None:
     law = CASES[name]
     try:

@@ -1,6 +1,7 @@
 """Long C functions divided into loops: short, with the bits of CasADi's virtual machine."""
 
 from collections.abc import Callable
+from itertools import product
 
 import casadi as ca
 import numpy as np
@@ -8,11 +9,15 @@ import pytest
 
 from symfric import BrownMcPhee
 from symfric.bench.multibody import chain, integrator
+from symfric.foundation.instructions import CODES, OPERATIONS, UNARY
+from symfric.foundation.numeric import applied
 from symfric.integrator.compiled import loops
 from symfric.integrator.compiled.columns import Columns, rows_source
 
 N = 240
 """Number of repetitions."""
+NAMES = sorted({*OPERATIONS} - {"erfinv"})
+"""Operations of which C has all."""
 Terms = Callable[[ca.SX, ca.SX, ca.SX, int], ca.SX]
 
 
@@ -40,6 +45,14 @@ def changing(x: ca.SX, before: ca.SX, u: ca.SX, k: int) -> ca.SX:
     return smooth(x, before, u, k) if k not in (100, 101, 150) else ca.tanh(x + before * u)
 
 
+def every(x: ca.SX, before: ca.SX, u: ca.SX, k: int) -> ca.SX:
+    """One operation of CasADi after the other, comparisons, and an infinite constant."""
+    name = NAMES[k % len(NAMES)]
+    made = applied(CODES[name], (x,) if name in UNARY else (x, before))
+    low = ca.fmin(u, -ca.inf if k == 7 else 0.1 * k)
+    return ca.if_else(ca.logic_and(ca.fabs(made) < 3.0, made < ca.inf), made, u * x) + low
+
+
 ORDERS = {
     "in order": [*range(N)],
     "reversed": [*range(N)][::-1],
@@ -47,10 +60,12 @@ ORDERS = {
 }
 
 
-@pytest.mark.parametrize("order", ORDERS.values(), ids=ORDERS)
-@pytest.mark.parametrize("terms", [smooth, numbered, changing])
-def test_loops_have_the_bits_of_the_virtual_machine(terms: Terms, order: list[int]) -> None:
-    columns = Columns(recursion(terms, order))
+CASES = [*product([smooth, numbered, changing], ORDERS), (every, "in order")]
+
+
+@pytest.mark.parametrize(("terms", "order"), CASES)
+def test_loops_have_the_bits_of_the_virtual_machine(terms: Terms, order: str) -> None:
+    columns = Columns(recursion(terms, ORDERS[order]))
     rng = np.random.default_rng(0)
     rows = [rng.normal(size=(5, N)), rng.normal(size=(5, 2))]
     vm, c = (columns(rows, backend=backend) for backend in ("vm", "compiled"))
