@@ -32,6 +32,7 @@ def analyse(
     longest: float = 0.05,
     state: str | None = None,
     plot: Path | None = None,
+    html: Path | None = None,
     save: Path | None = None,
     json: str | None = None,
 ) -> None:
@@ -44,7 +45,7 @@ def analyse(
 
     Example: symfric analyse rabinowicz --law lugre --over v_belt=0.05:0.5 --plot branches.png
     """
-    opt.check_outputs(save, json, picture=plot)
+    opt.check_outputs(html, save, json, picture=plot)
     checks.choice("--from", start, STARTS)
     name, low, high = _range(over)
     laws = opt.laws_of(law)
@@ -67,12 +68,12 @@ def analyse(
             branches = [rest]
             for hopf in rest.located("Hopf"):
                 branches.append(orbits_from(rest, hopf, (low, high), points=points, step=longest))
-    if plot:
-        branches[0].plot(own, *branches[1:], path=plot)
-    if save:
-        branches[-1].save(save)
     content = {"scene": scene, "law": law[0], "branches": [b.to_dict() for b in branches]}
-    output.finish(content, json, partial(_show, branches), plot, save)
+    draw = partial(branches[0].plot, own, *branches[1:])
+    if html:
+        branches[0].to_html(html, *branches[1:], state=own, command=output.command_line())
+    files = (plot, draw), (html, None), (save, branches[-1].save)
+    output.finish(content, json, partial(_show, branches), *files)
 
 
 def _range(text: str) -> tuple[str, float, float]:

@@ -1,8 +1,5 @@
 """`symfric run` and `symfric report`: simulate a scene with one friction law or several."""
 
-import os
-import shlex
-import sys
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import fields
 from functools import partial
@@ -92,8 +89,6 @@ def run(
 
     found = simulated(scene, models, integrate)
     first = found[chosen]
-    if csv:
-        first.to_csv(csv)
     if plot:
         from symfric.results.pictures import plot_trajectories  # noqa: PLC0415  (slow to import)
 
@@ -105,7 +100,8 @@ def run(
             first.animate(movie, progress=tell)
     content = to_dict(chosen, machines[chosen], first) if json else {}
     show = partial(show_runs, found, machines)
-    output.finish(content | {"inputs": given.texts}, json, show, csv, plot, movie)
+    files = (csv, first.to_csv), (plot, None), (movie, None)
+    output.finish(content | {"inputs": given.texts}, json, show, *files)
     refuse_failed(found.values())
 
 
@@ -143,10 +139,8 @@ def report(
             throw=False, progress=tell,
         ),
     )  # fmt: skip
-    # in the C locale, Python represents bytes that it cannot decode as lone surrogates
-    command = os.fsencode(shlex.join(["symfric", *sys.argv[1:]])).decode(errors="replace")
     values = {name: parameters(machine) for name, machine in machines.items()}
-    write_report(found, html, settings=values, command=command)
+    write_report(found, html, settings=values, command=output.command_line())
     output.say_written(html)
     refuse_failed(found.values())
 

@@ -280,7 +280,7 @@ AT_START = crossed(x.symbol - 1)
 LATER = crossed(ca.fmax(0.5 - t, 0))
 
 
-@pytest.mark.parametrize("method", sorted(name for name, m in METHODS.items() if m.dae))
+@pytest.mark.parametrize("method", ["backward_euler", "radau5", "rodas5p"])
 def test_regular_matrix_with_a_zero_pivot_is_not_singular(method: str) -> None:
     """The order by fill begins with s; with s = 0 every run ended with "is singular" at t = 0.
 
