@@ -62,7 +62,8 @@ NAMES: dict[str, Any] = {
     "Drive": Drive, "Frame": Frame, "GERMAN": GERMAN,
     "NAMES": {"t": "Zeit", "x": "Winkel", "force": "Moment"},
     "TWICE": f"{HEADER}\n0,0,1\n1,1,2\n1,1,2\n2,1,2\n3,4,5\n", "MODEL": DRIVE.model(free=FREE),
-    "AXIS": AXIS, "crane_log": crane_log, "urdf": urdf, "Velocity": Velocity, "by_channel": by_channel, "cut": cut, "choose": choose, "plain": plain,
+    "AXIS": AXIS, "crane_log": crane_log, "urdf": urdf,
+    "Velocity": Velocity, "by_channel": by_channel, "cut": cut, "choose": choose, "plain": plain,
     "subject": subject, "from_data": from_data, "replace": replace, "SX": ca.SX,
 }  # fmt: skip
 
