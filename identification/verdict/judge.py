@@ -30,7 +30,7 @@ import numpy as np
 
 from identification.data.findings import Findings
 from identification.residuals.evaluation import Channel
-from identification.verdict.colour import Colour, Whiteness, span, whiteness
+from identification.verdict.colour import Colour, Whiteness, positions, span, whiteness
 from identification.verdict.covariance import FAR, Levels
 from identification.verdict.independence import (
     FORCES,
@@ -41,7 +41,7 @@ from identification.verdict.independence import (
     resolution,
     rms,
 )
-from identification.verdict.minimum import Minimum, positions
+from identification.verdict.minimum import Minimum
 from symfric.foundation.status import Status
 
 ALARM = 0.02
