@@ -114,9 +114,18 @@ def compare(
         able, note = _able(named, lambda law: in_scene(law, scenario))
         return replace(scene_figure(scenario, able), note=note)
     given = scales(first, N)
-    able, note = _able(named, lambda law: FIGURES[scenario](law, N, given))
+    return together(named, lambda law: FIGURES[scenario](law, N, given))
+
+
+def together(laws: Mapping[str, AnyLaw], make: Callable[[AnyLaw], FigureData]) -> FigureData:
+    """Return one figure of `laws`, given by legend entry; its note lists those that `make` rejects.
+
+    Raises:
+        ValueError, SolveError: the error of the first law, if all laws failed.
+    """
+    able, note = _able(laws, make)
     shown = [data.named(name) for name, data in able.items()]
-    title = _title([named[name] for name in able], shown)
+    title = _title([laws[name] for name in able], shown)
     curves = tuple(curve for one in shown for curve in one.curves)
     notes = "; ".join(text for text in (shown[0].note, note) if text)
     return replace(shown[0], title=title, curves=curves, note=notes)
