@@ -89,7 +89,7 @@ class _Integers:
         body = StatementWriter(self.writer.source, names, targets, self.writer, given)
         own = [names[2][j] for i, j in sorted(body.used) if (i, j) not in loads]
         lines = [*(f"{name} = {clamped(name, name)};" for name in own), *body.region(0)]
-        return Code(frozenset(body.used), tuple(lines), Counter(), 0, 0)
+        return Code(frozenset(body.used), tuple(lines), Counter(), 0)
 
     def helpers(self, text: str) -> str:
         """Return the functions and tables of `fixed.c` that `text` needs."""
