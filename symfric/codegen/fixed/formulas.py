@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from math import ceil
+from re import findall
 from typing import final
 
 import casadi as ca
@@ -26,6 +27,7 @@ from symfric.emitter.c99 import (
     Expression,
     Formulas,
     filled,
+    needed,
 )
 from symfric.emitter.emit import Code, StatementWriter
 from symfric.emitter.logic import logical
@@ -72,13 +74,8 @@ class IntegerWriter(Formulas):
 
     def helpers(self, text: str) -> str:
         """Return the functions and tables of `fixed.c` that `text` needs."""
-        needed = ""
-        whole = filled(TEMPLATES / "fixed.c", name=self.prefix).rstrip()
-        for part in reversed(whole.split("\n\n")):
-            name = part.partition("\nstatic ")[2].partition("(")[0].partition("[")[0].split()[-1]
-            if f"{name}(" in text + needed or f"{name}," in needed:
-                needed = f"{part}\n\n{needed}"
-        return needed
+        whole = filled(TEMPLATES / "fixed.c", name=self.prefix).rstrip().split("\n\n")
+        return needed({findall(r"\nstatic .*?(\w+)[(\[]", part)[0]: part for part in whole}, text)
 
     def formula(self, i: int) -> Expression:
         """Return the formula of a node: a bool, or an integer in its format."""
