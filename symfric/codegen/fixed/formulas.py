@@ -127,9 +127,9 @@ class IntegerWriter(Formulas):
             value = max(-LARGEST, min(round(node.value * 2.0**bits), LARGEST))
             return Expression(str(value), ATOM if value >= 0 else SIGN)
         shift = self.formats[i] - bits
-        if shift > BITS:
-            return Expression("0", ATOM)
         value = self.expression(i)
+        if shift > BITS:  # 0, by a function so that the local of the value has a use
+            return self.call("limit", value.text, -shift, 0)
         if shift > 0:
             return self.call("round", value.text, shift)
         return value if shift == 0 else Expression(f"{value.within(ATOM)} * {1 << -shift}", PRODUCT)
