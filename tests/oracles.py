@@ -5,7 +5,7 @@ Nothing here imports symfric, so that a mistake cannot stand on both sides of a 
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import acos, atan, atan2, cos, exp, hypot, inf, pi, sin, sqrt, tanh
+from math import acos, atan, atan2, cos, exp, hypot, inf, pi, sin, sqrt
 
 
 @dataclass(frozen=True)
@@ -55,18 +55,6 @@ def rabinowicz_karnopp(
 
 
 Rates = Callable[[float, list[float]], list[float]]
-
-
-def rabinowicz_brown_mcphee() -> Rates:
-    """Right-hand side of (x, v) for the block on a belt with Brown-McPhee friction."""
-
-    def rates(t: float, y: list[float]) -> list[float]:
-        x, v = y
-        s = (v - 0.1) / 1e-3
-        mu = 0.1 * tanh(4 * s) + (0.15 - 0.1) * s / (s * s / 4 + 0.75) ** 2
-        return [v, -(2.1 * x + mu * 0.8 * 9.81) / 0.8]
-
-    return rates
 
 
 def rabinowicz_lugre() -> Rates:

@@ -16,7 +16,6 @@ from identification.data.filters import (
     any_within,
     averaged,
     band_above,
-    central_difference,
     choose_filter,
     fourth_order_difference,
     frequencies,
@@ -24,6 +23,7 @@ from identification.data.filters import (
     noise_level,
     position_band,
     rounded_level,
+    second_difference,
     spectrum,
     weighted,
 )
@@ -87,8 +87,8 @@ class Velocity:
         V = V_x + W (V_v - V_x),   W = E_x / (E_x + E_v),   E = W^2 E_v + (1 - W)^2 E_x
 
     With W averaged over 1 Hz or 99 frequencies, this has almost the least noise of all unbiased
-    combinations. E_x is white noise of the position after the central difference s = sin(w h) / h,
-    plus the bias of this difference:
+    combinations. E_x is white noise of the position after the difference of fourth order, with the
+    gain s instead of w, plus the bias of this difference:
 
         E_x = S_x s^2 + (1 - s / w)^2 (|V_v|^2 - S_v)
 
@@ -141,26 +141,27 @@ class Velocity:
         power = spectrum(known, line=True)
         ones = np.ones(power.size)
         of_x = ones * (rounded_level(known, power) if x_noise is None else x_noise**2)
-        by_x = of_x * (np.sin(2 * np.pi * frequency) / step) ** 2
+        gain = np.sinc(2 * frequency) * (4 - np.cos(2 * np.pi * frequency)) / 3  # s / w
+        by_x = of_x * (2 * np.pi * frequency * gain / step) ** 2
         if v is None:
             return Velocity(frequency, 0 * ones, by_x, power, of_x, 2)
         measured = power if x is None else spectrum(v, line=True)
         of_v = velocity_noise(measured) if v_noise is None else ones * v_noise**2
         if x is None:
             return Velocity(frequency, ones, of_v, power, of_v, 1)
-        deficit = 1 - np.sinc(2 * frequency)
-        short = deficit**2 * np.maximum(averaged(measured, step, WIDTH) - of_v, 0.0)
+        short = (1 - gain) ** 2 * np.maximum(averaged(measured, step, WIDTH) - of_v, 0.0)
         usual = averaged(by_x, step, WIDTH) + short
-        apart = averaged(spectrum(v - central_difference(x, step)), step, WIDTH)
+        derived = fourth_order_difference(x, step)
+        apart = averaged(spectrum(v - derived), step, WIDTH)
         differ = (apart > SURE * usual) | (SURE * apart < usual)
         of_v = np.maximum(of_v, np.where(differ, np.abs(apart - usual), 0.0))
         by_x = by_x + short
         both = by_x + of_v
         best = np.divide(by_x, both, out=np.ones(both.size), where=both > 0)
-        weight = averaged(best, step, WIDTH)  # narrow bands ring at ends of the record
+        weight = averaged(best, step, WIDTH)  # narrow bands ring at ends of the record and jumps
         noise = weight**2 * of_v + (1 - weight) ** 2 * by_x
         found = Velocity(frequency, weight, noise, measured, noise, 1)
-        mixed = spectrum(found.mixed(central_difference(x, step), v), line=True)
+        mixed = spectrum(found.mixed(derived, v), line=True)
         return replace(found, power=mixed)
 
     def mixed(self, of_x: Array, of_v: Array) -> Array:
@@ -263,10 +264,9 @@ def derivatives(
 ) -> tuple[Array, Array, Array]:
     """Return filtered position, velocity and acceleration, each shape (n,).
 
-    Velocities are central differences of the filtered position. The acceleration is its second
-    difference over two steps, whose gain is only (w h)^2 / 12 below one. A measured velocity is
-    filtered and differentiated once, with a gain (w h)^4 / 30 below one. If both are measured,
-    `mixer` combines their derivatives.
+    Differences of the filtered position have the order four: gains of velocity and acceleration
+    are (w h)^4 / 30 and (w h)^4 / 90 below one. A measured velocity is filtered and differentiated
+    once. If both are measured, `mixer` combines their derivatives.
 
     Args:
         x: samples of the position; None: not measured (zeros are returned).
@@ -279,8 +279,7 @@ def derivatives(
     by_v: list[Array] = []
     if x is not None:
         x = lowpass(x, filter.cutoff, step, filter.order)
-        inner = (x[2:] - 2 * x[1:-1] + x[:-2]) / step**2
-        by_x = [central_difference(x, step), np.pad(inner, 1, mode="edge")]
+        by_x = [fourth_order_difference(x, step), second_difference(x, step)]
     if v is not None:
         v = lowpass(v, filter.cutoff, step, filter.order)
         by_v = [v, fourth_order_difference(v, step)]

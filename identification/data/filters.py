@@ -192,11 +192,22 @@ def central_difference(signal: Array, step: float) -> Array:
 
 
 def fourth_order_difference(x: Array, step: float) -> Array:
-    """Return (x[-2] - 8 x[-1] + 8 x[+1] - x[+2]) / (12 h), and `central_difference` at the ends."""
+    """Return (x[-2] - 8 x[-1] + 8 x[+1] - x[+2]) / (12 h), and `central_difference` at the ends.
+
+    Its gain is (8 sin(w h) - sin(2 w h)) / (6 h) instead of w.
+    """
     rate = central_difference(x, step)
     if x.size > 4:
-        rate[2:-2] = (x[:-4] - 8 * x[1:-3] + 8 * x[3:-1] - x[4:]) / (12 * step)
+        rate[2:-2] = (8 * (x[3:-1] - x[1:-3]) - (x[4:] - x[:-4])) / (12 * step)  # constant: 0
     return rate
+
+
+def second_difference(x: Array, step: float) -> Array:
+    """Return (-x[-2] + 16 x[-1] - 30 x + 16 x[+1] - x[+2]) / (12 h^2), repeated at both ends."""
+    here = x[2:-2]
+    near = (x[1:-3] - here) + (x[3:-1] - here)
+    far = (x[:-4] - here) + (x[4:] - here)
+    return np.pad((16 * near - far) / (12 * step**2), 2, mode="edge")
 
 
 @final
@@ -317,9 +328,9 @@ def rounded_level(signal: Array, power: Array) -> float:
 
 def averaged(power: Array, step: float, least: int = FEW) -> Array:
     """Return a spectrum averaged over 1 Hz or `least` neighbours, whichever is wider."""
-    ones = np.ones(_width(power, step, least))
-    count = np.convolve(np.ones(power.size), ones, mode="same")
-    return np.convolve(power, ones, mode="same") / count
+    window = np.hanning(_width(power, step, least) + 2)[1:-1]
+    count = np.convolve(np.ones(power.size), window, mode="same")
+    return np.convolve(power, window, mode="same") / count
 
 
 def _width(power: Array, step: float, least: int) -> int:
@@ -351,23 +362,22 @@ def band_above(power: Array, noise: Array, step: float, order: int) -> float:
     return float(frequency[max(1, known[-1])] if known.size else frequency[1])
 
 
-def choose_filter(
-    force: Array, step: float, bands: Sequence[float] = (), rows: int = 100
-) -> Filter:
+def choose_filter(force: Array, step: float, bands: Sequence[float], rows: int = 100) -> Filter:
     """Choose a filter from the data by the bandwidths f_b of the force and f_a of the motion.
 
-        cut-off 5 f_b (at most half the Nyquist frequency), decimation 0.8 Nyquist / (2 f_b)
+        cut-off max(5 f_b, f_a) (at most Nyquist / 2),   decimation 0.8 Nyquist / (2 f_b)
 
     f_b is rounded to one digit. The factors are those of the EMPS reference, which sets f_b = 20 Hz
     by hand. f_a is the median of `bands`, the significant bandwidths of the coordinates. It limits
     f_b and the cut-off of the decimation, 0.9 Nyquist / decimation, because noise in the
-    acceleration lowers the mass. At least `rows` equations remain, if possible.
+    acceleration lowers the mass. Lower cut-offs spread the jumps of the force at reversals. At
+    least `rows` equations remain, if possible.
     """
     nyquist = 0.5 / step
-    known = float(np.median([*bands] or [nyquist]))
+    known = float(np.median(bands))
     found = max(min(bandwidth(force, step), known), 1 / (force.size * step))
     digit = 10.0 ** floor(log10(found))
     f_b = round(found / digit) * digit
     wanted = max(round(0.4 * nyquist / f_b), round(PASS * nyquist / known))
     decimation = min(wanted, force.size // (rows + 4 * LOBES))
-    return Filter(min(5 * f_b, 0.5 * nyquist), max(1, decimation))
+    return Filter(min(max(5 * f_b, known), 0.5 * nyquist), max(1, decimation))

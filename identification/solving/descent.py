@@ -196,14 +196,21 @@ def descend(
 
 
 def _back(search: _Search) -> int:
-    """Replace values that count as zero or infinite by finite limits if the cost permits it.
+    """Move values to a bound that they nearly reach if the cost permits it; the others adapt.
 
-    Return the number of evaluations that this takes.
+    Values that count as zero or infinite are replaced by finite limits. Return the number of
+    evaluations that this takes.
     """
     box, old = search.task.unknowns, search.best
-    w = np.clip(old.w, *box.limits)
+    linear = np.array([not u.logarithmic for u in box.unknowns])
+    bound = np.where(old.w - box.lower < box.upper - old.w, box.lower, box.upper)
+    near = box.at_bound(old.w) & linear & np.isfinite(bound)
+    w = np.where(near, bound, np.clip(old.w, *box.limits))
     if np.array_equal(w, old.w):
         return 0
+    J = old.reduced[1]
+    adapted = np.linalg.lstsq(J[:, ~near], J[:, near] @ (old.w - w)[near])[0]
+    w[~near] = np.clip(w[~near] + adapted, box.lower[~near], box.upper[~near])
     there = search.task.at(w)
     if isinstance(there, Point) and there.cost - old.cost <= NEAR * variance(search.task, old):
         search.best = there

@@ -22,7 +22,7 @@ from typing import Any, NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.residuals.evaluation import Array
+from identification.residuals.evaluation import Array, Channel
 from symfric.foundation.shown import brief
 
 Count = NDArray[np.int64]
@@ -99,6 +99,58 @@ class Colour(NamedTuple):
             row[:k] = -table[k, :k][::-1]
             inverse += np.outer(row, row) / spread[k]
         return inverse / max(self.freedom, 1.0)
+
+
+JITTER = 0.5
+"""Relative deviation from the usual step above which consecutive rows are not neighbours."""
+
+
+def positions(channel: Channel, *, across_windows: bool = False) -> Count:
+    """Return the number of consecutive neighbours in time before each row, shape (n,).
+
+    A run starts with 0: at the first row, at a break, where time jumps or repeats, and everywhere
+    if the channel is unordered. With `across_windows`, a run continues over the breaks of windows
+    if time continues, because the noise of a sensor does not depend on windows.
+    """
+    n = channel.t.size
+    if not channel.ordered:
+        return np.zeros(n, dtype=np.int64)
+    starts = np.zeros(n, dtype=bool)
+    starts[:1] = True
+    starts[1:] = ~(np.abs(np.diff(channel.t) / _step(channel.t) - 1) < JITTER)
+    if not across_windows:
+        starts[[b for b in channel.breaks if 0 < b < n]] = True
+    here = np.arange(n, dtype=np.int64)
+    return here - np.maximum.accumulate(np.where(starts, here, 0))
+
+
+def places(channel: Channel) -> Count:
+    """Return the index of each row on the grid of the usual step, shape (n,).
+
+    Rows of equal time have the same index. If the times are not on a grid, rows are counted, with
+    one index left out at every gap.
+    """
+    n = channel.t.size
+    if not channel.ordered or n < 2:
+        return np.arange(n, dtype=np.int64)
+    steps = (channel.t - channel.t[0]) / _step(channel.t)
+    grid = np.rint(steps)
+    if np.abs(steps - grid).max() < 0.2 and steps.min() >= 0 and grid.max() < 20 * n:
+        return grid.astype(np.int64)
+    return np.cumsum(1 + (positions(channel, across_windows=True) == 0)).astype(np.int64) - 2
+
+
+def lagged(signal: Array, position: Count, lag: int) -> Array:
+    """Return `signal` delayed by `lag` rows; before the start of a run it has its first value."""
+    back = np.minimum(position, lag)
+    return signal[np.arange(signal.shape[0]) - back]
+
+
+def _step(t: Array) -> float:
+    """Return the usual step between consecutive rows."""
+    steps = np.diff(t)
+    steps = steps[steps > 0]
+    return float(np.median(steps)) if steps.size else 1.0
 
 
 def colour(r: Array, J: Array, position: Count, *, refine: bool = True) -> Colour:

@@ -199,6 +199,11 @@ def covariance(found: Minimum, levels: Levels | None = None) -> Covariance:
     effective = {n: c.effective for n, c in zip(labels, inside.colours, strict=True)}
     weak = _weak(found, matrix, low, high, {*far, *gone})
     alone = [sentence for _, sentence in lost]
+    if uneven := [name for name, x in zip(names, inside.uneven, strict=True) if x]:
+        alone.append(
+            f"The residuals are larger where the data determine {', '.join(uneven)}: the intervals "
+            "follow from the residuals there."
+        )
     messages = (*alone, *far.values(), *gone.values(), *weak)
     notes = dict.fromkeys(gone, LOST) | dict.fromkeys(far, BEYOND)
     out = np.array([name in notes for name in names], dtype=bool)

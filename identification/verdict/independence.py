@@ -40,9 +40,9 @@ import numpy as np
 
 from identification.data.record import blocks
 from identification.residuals.evaluation import DEAD_TIME, Array, Channel
-from identification.verdict.colour import Colour, Count, deviance, span, whitened
+from identification.verdict.colour import Colour, Count, deviance, lagged, positions, span, whitened
 from identification.verdict.colour import colour as autoregressive
-from identification.verdict.minimum import Minimum, lagged, positions
+from identification.verdict.minimum import Minimum
 
 Kind = Literal["position", "velocity", "acceleration", "time", "delay", "force", ""]
 

@@ -30,7 +30,7 @@ import numpy as np
 
 from identification.data.findings import Findings
 from identification.residuals.evaluation import Channel
-from identification.verdict.colour import Colour, Whiteness, span, whiteness
+from identification.verdict.colour import Colour, Whiteness, positions, span, whiteness
 from identification.verdict.covariance import FAR, Levels
 from identification.verdict.independence import (
     FORCES,
@@ -41,7 +41,7 @@ from identification.verdict.independence import (
     resolution,
     rms,
 )
-from identification.verdict.minimum import Minimum, positions
+from identification.verdict.minimum import Minimum
 from symfric.foundation.status import Status
 
 ALARM = 0.02
@@ -212,9 +212,10 @@ def _independent(
         least = SMOOTHED * float(np.ptp(channel.measured)) if family.smoothed else fine
         least = max(least, NOISY * channel.motion_noise) if family.noisy else least
         passed = p >= limit or size <= least or (share < SHARE and moved < MOVED)
+        part = f"{100 * min(share, 1.0):.0f} %" if share >= 0.01 else "less than 1 %"
         text = (
             f"The residuals of {name} depend on {family.what}: {size:.2g} {unit} rms, "
-            f"{100 * min(share, 1.0):.0f} % of their variance ({family.hint})."
+            f"{part} of their variance ({family.hint})."
         )
         if passed:
             text = f"The residuals of {name} do not depend on {family.what}."

@@ -16,62 +16,10 @@ from numpy.typing import NDArray
 from identification.residuals.evaluation import Array, Blocks, Channel, Extended, influence
 from identification.solving.task import Point, Task
 from identification.unknowns.spec import Unknown
-from identification.verdict.colour import Colour, Count, colour
+from identification.verdict.colour import Colour, colour, places, positions
 
 Shift = Callable[[Array], float]
 """Function from values to the norm of the change of the residuals."""
-
-JITTER = 0.5
-"""Relative deviation from the usual step above which consecutive rows are not neighbours."""
-
-
-def positions(channel: Channel, *, across_windows: bool = False) -> Count:
-    """Return the number of consecutive neighbours in time before each row, shape (n,).
-
-    A run starts with 0: at the first row, at a break, where time jumps or repeats, and everywhere
-    if the channel is unordered. With `across_windows`, a run continues over the breaks of windows
-    if time continues, because the noise of a sensor does not depend on windows.
-    """
-    n = channel.t.size
-    if not channel.ordered:
-        return np.zeros(n, dtype=np.int64)
-    starts = np.zeros(n, dtype=bool)
-    starts[:1] = True
-    starts[1:] = ~(np.abs(np.diff(channel.t) / _step(channel.t) - 1) < JITTER)
-    if not across_windows:
-        starts[[b for b in channel.breaks if 0 < b < n]] = True
-    here = np.arange(n, dtype=np.int64)
-    return here - np.maximum.accumulate(np.where(starts, here, 0))
-
-
-def places(channel: Channel) -> Count:
-    """Return the index of each row on the grid of the usual step, shape (n,).
-
-    Rows of equal time have the same index. If the times are not on a grid, rows are counted, with
-    one index left out at every gap.
-    """
-    n = channel.t.size
-    if not channel.ordered or n < 2:
-        return np.arange(n, dtype=np.int64)
-    steps = (channel.t - channel.t[0]) / _step(channel.t)
-    grid = np.rint(steps)
-    if np.abs(steps - grid).max() < 0.2 and steps.min() >= 0 and grid.max() < 20 * n:
-        return grid.astype(np.int64)
-    return np.cumsum(1 + (positions(channel, across_windows=True) == 0)).astype(np.int64) - 2
-
-
-def lagged(signal: Array, position: Count, lag: int) -> Array:
-    """Return `signal` delayed by `lag` rows; before the start of a run it has its first value."""
-    back = np.minimum(position, lag)
-    return signal[np.arange(signal.shape[0]) - back]
-
-
-def _step(t: Array) -> float:
-    """Return the usual step between consecutive rows."""
-    steps = np.diff(t)
-    steps = steps[steps > 0]
-    return float(np.median(steps)) if steps.size else 1.0
-
 
 RANK = 1e-7
 """Smallest nonzero singular value of the scaled sensitivities, relative to the largest."""
@@ -80,7 +28,11 @@ RANK = 1e-7
 class Sandwich(NamedTuple):
     """Linearised uncertainty of k values that depend on n coordinates.
 
-    Directions that the residuals do not determine are listed in `null` and do not contribute.
+    Directions that the residuals do not determine are listed in `null` and do not contribute. If
+    the residuals are larger in the rows that determine a value, the variances follow from the
+    squares of the residuals in these rows, r^2 / (1 - leverage), and their number.
+    Sources: MacKinnon and White, J. Econometrics 29(3), 1985 (HC2); Imbens and Kolesar, Rev. Econ.
+    Stat. 98(4), 2016 (degrees of freedom).
 
     Attributes:
         coloured: covariance of the values with the autocorrelation of each channel, shape (k, k).
@@ -89,6 +41,7 @@ class Sandwich(NamedTuple):
             including the uncertainty of the estimated autocorrelation), shape (k,).
         null: directions of the coordinates along which the residuals do not change, (n, nullity).
         colours: autoregressive models of the channels.
+        uneven: mask of the values determined by rows with larger residuals, shape (k,).
     """
 
     coloured: Array
@@ -96,6 +49,7 @@ class Sandwich(NamedTuple):
     freedom: Array
     null: Array
     colours: tuple[Colour, ...]
+    uneven: NDArray[np.bool_]
 
     @property
     def widening(self) -> float:
@@ -131,6 +85,21 @@ def _meat(found: Colour, bread: Array, place: NDArray[np.int64]) -> tuple[Array,
         slope += slopes @ np.abs(waves) ** 2
     spread = np.einsum("pi,pq,qi->i", slope, found.doubt, slope)
     return sums, 2 * np.diag(sums) ** 2 / found.freedom + spread
+
+
+UNEVEN = 0.01
+"""Level of the test for larger residuals in the rows that determine a value."""
+
+
+def _local(found: Colour, bread: Array, squares: Array) -> tuple[Array, Array]:
+    """Return the variances by local squares of residuals relative to those by their mean, (k,).
+
+    The second array holds the variances of the first for residuals of equal size.
+    """
+    S = found.spectrum(2**10)[0]
+    alike = float(np.mean(S**2) / np.mean(S) ** 2)  # correlated squares are worth fewer
+    share = bread**2 / np.maximum(np.sum(bread**2, axis=0), 1e-300)
+    return share.T @ squares / found.white, 2 * alike * np.sum(share**2, axis=0)
 
 
 @final
@@ -191,32 +160,45 @@ class Minimum:
     @cached_property
     def sandwich(self) -> Sandwich:
         """Linearised uncertainty of the values, with independent noise in the channels."""
+        from scipy.special import chdtrc  # noqa: PLC0415  (slow to import)
+
         free = ~self.held
         size = np.linalg.norm(self.J * free, axis=0)
         size = np.where(size > 0, size, 1.0)
         scaled = self.J / size * free
-        _, s, Vt = np.linalg.svd(scaled * np.sqrt(self.gain)[:, None], full_matrices=False)
+        U, s, Vt = np.linalg.svd(scaled * np.sqrt(self.gain)[:, None], full_matrices=False)
         kept = s > RANK * max(float(s[0]) if s.size else 0.0, 1e-300)
         inverse = (Vt[kept].T / s[kept] ** 2) @ Vt[kept]
         bread = scaled @ (inverse @ (self.slope / size).T)  # (rows, k)
         reach = np.abs(bread).max(axis=0, initial=0.0)
         reach = np.where(reach > 0, reach, 1.0)  # scaling; variances of variances would overflow
         bread = bread / reach
+        squares = self.r**2 / np.maximum(1 - np.sum(U[:, kept] ** 2, axis=1), 1e-6)
         k = len(self.names)
         coloured, white, spread = np.zeros((k, k)), np.zeros((k, k)), np.zeros(k)
+        local, chance = np.zeros(k), np.zeros(k)
         for channel, seen in zip(self.channels, self.colours, strict=True):
             B = bread[channel.rows]
             C, wide = _meat(seen, B, places(channel))
             coloured, white, spread = coloured + C, white + seen.white * B.T @ B, spread + wide
+            ratio, varies = _local(seen, B, squares[channel.rows])
+            local, chance = local + np.diag(C) * ratio, chance + np.diag(C) ** 2 * varies
         total = np.diag(coloured) ** 2
-        freedom = 2 * np.divide(total, spread, where=spread > 0, out=np.ones(k))
+        freedom, rows = (
+            2 * np.divide(total, part, where=part > 0, out=np.ones(k)) for part in (spread, chance)
+        )
+        ratio = np.divide(local, np.diag(coloured), where=total > 0, out=np.ones(k))
+        uneven = chdtrc(rows, rows * ratio) < UNEVEN / max(np.count_nonzero(total), 1)
+        if uneven.any():
+            wider = np.sqrt(np.maximum(ratio, 1.0))
+            coloured, freedom = np.outer(wider, wider) * coloured, np.minimum(freedom, rows)
         inside = Vt[kept][:, free]  # free directions orthogonal to `inside` are null
         null = np.zeros((free.size, inside.shape[1] - inside.shape[0]))
         null[free] = np.linalg.svd(inside, full_matrices=True)[2][inside.shape[0] :].T
         back = np.outer(reach, reach)
         coloured, white = back * coloured, back * white
         freedom = np.maximum(freedom, 1.0)
-        return Sandwich(coloured, white, freedom, null / size[:, None], self.colours)
+        return Sandwich(coloured, white, freedom, null / size[:, None], self.colours, uneven)
 
 
 LONG, BLOCKS = 50_000, 20

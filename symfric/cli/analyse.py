@@ -6,15 +6,13 @@ from pathlib import Path
 from symfric import Law, simulate
 from symfric.cli import options as opt
 from symfric.cli import output
-from symfric.cli.machines import driven, scenes_with
+from symfric.cli.machines import OwnMachine, driven, scenes_with
 from symfric.cli.options import Strings
-from symfric.cli.select import function_of_file
 from symfric.dynamics import Branch, continuation, equilibrium, orbits_from, periodic_orbit
 from symfric.foundation import checks
 from symfric.foundation.parameters import Variable, check_names, parameters
 from symfric.model import Model
 from symfric.model.kinds import MODE
-from symfric.model.model import check_model
 from symfric.scenes import ALL_SCENES as ALL_SCENES  # for options.toml
 
 STARTS = ("run", "equilibrium")
@@ -34,6 +32,7 @@ def analyse(
     longest: float = 0.05,
     state: str | None = None,
     plot: Path | None = None,
+    html: Path | None = None,
     save: Path | None = None,
     json: str | None = None,
 ) -> None:
@@ -46,7 +45,7 @@ def analyse(
 
     Example: symfric analyse rabinowicz --law lugre --over v_belt=0.05:0.5 --plot branches.png
     """
-    opt.check_outputs(save, json, picture=plot)
+    opt.check_outputs(html, save, json, picture=plot)
     checks.choice("--from", start, STARTS)
     name, low, high = _range(over)
     laws = opt.laws_of(law)
@@ -69,12 +68,12 @@ def analyse(
             branches = [rest]
             for hopf in rest.located("Hopf"):
                 branches.append(orbits_from(rest, hopf, (low, high), points=points, step=longest))
-    if plot:
-        branches[0].plot(own, *branches[1:], path=plot)
-    if save:
-        branches[-1].save(save)
     content = {"scene": scene, "law": law[0], "branches": [b.to_dict() for b in branches]}
-    output.finish(content, json, partial(_show, branches), plot, save)
+    draw = partial(branches[0].plot, own, *branches[1:])
+    if html:
+        branches[0].to_html(html, *branches[1:], state=own, command=output.command_line())
+    files = (plot, draw), (html, None), (save, branches[-1].save)
+    output.finish(content, json, partial(_show, branches), *files)
 
 
 def _range(text: str) -> tuple[str, float, float]:
@@ -100,24 +99,20 @@ def _machine(
     name: str, x0: Strings, t_end: float | None,
 ) -> tuple[Model, dict[str, float], float]:  # fmt: skip
     """Return the model with a free parameter, the start values and the end time of a run."""
-    over, (chosen,) = f"--over of {scene}", laws.values()
-    if ".py" in scene:
-        make = function_of_file("analyse", scene, opt.numbers("--set", settings))
-        model = make(chosen)
-        check_model(f"analyse '{scene}'", model)
-        check_names(over, [name], [v.name for v in (*model.p, *model.u)])
-        return model, opt.numbers("--x0", x0), 100.0 if t_end is None else t_end
     (machine,) = scenes_with(scene, laws, settings, preset, law_of).values()
-    known = parameters(machine)
+    of_file = isinstance(machine, OwnMachine)
+    known = [] if of_file else [*parameters(machine)]
     model = machine.model([name] if name in known else [])
-    check_names(over, [name], [*known, *(v.name for v in model.u)])
-    given = driven(machine, model, None, x0, t_end)
+    known = [*known, *(v.name for v in (*model.p, *model.u))]
+    check_names(f"--over of {scene}", [name], known, "a parameter p of the model, or an input")
+    given = driven(machine, model, None, x0, 100.0 if of_file and t_end is None else t_end)
     if others := [one for one in given.signals if one != name]:
         raise ValueError(
             f"analyse {scene}: expected no inputs of time except that of --over, got "
             f"{', '.join(others)}; use periodic_orbit(..., period=) in Python"
         )
-    return model, given.start, max(given.until, 5 * machine.t_end) if t_end is None else t_end
+    longest = given.until if of_file else max(given.until, 5 * machine.t_end)
+    return model, given.start, longest if t_end is None else t_end
 
 
 def _show(branches: list[Branch]) -> None:

@@ -12,9 +12,8 @@ from symfric import Drive as Nameplate
 from symfric import Law, with_values
 from symfric.cli import options as opt
 from symfric.cli import output
-from symfric.cli.codegen_report import report
-from symfric.cli.codegen_targets import FIXED, REALS, write_controllers, write_fixed
-from symfric.cli.machines import kind_of, settable, with_set
+from symfric.cli.codegen_results import FIXED, REALS, report, write_controllers, write_fixed
+from symfric.cli.machines import OwnMachine, kind_of, settable, with_set
 from symfric.cli.options import Strings
 from symfric.codegen import (
     Block,
@@ -335,23 +334,22 @@ def machine_of(
 def plant(
     machine: Scene, h: float | None = None, **how: Any
 ) -> tuple[Block, tuple[StepError, ...], Callable[[], Block]]:
-    """Return the block of a plant, its errors, and a function for the block with h variable."""
-    block, size = plant_block(machine, h=h, **how), STEP_SIZE if h is None else h
-    errors = fixed_steps(machine, size, how["method"])
+    """Return the block of a plant, its errors, and a function for the block with h variable.
+
+    The errors are those of steps around h with the inputs of the scene, unless its motion is
+    shorter than h or unknown.
+    """
+    source = machine.model() if isinstance(machine, OwnMachine) else machine
+    block, size = plant_block(source, h=h, **how), STEP_SIZE if h is None else h
+    errors: tuple[StepError, ...] = ()
+    if size < machine.t_end:
+        inputs = {name: own.function for name, own in machine.inputs.items()}
+        try:
+            errors = step_errors(machine, size, machine.t_end, u=inputs, method=how["method"])
+        except SolveError as error:
+            output.note(f"errors of fixed steps were not measured: {error}")
     limits = (*block.limits, *(str(one) for one in errors if one.h == size))
-    return replace(block, limits=limits), errors, partial(plant_block, machine, **how)
-
-
-def fixed_steps(machine: Scene, h: float, method: str) -> tuple[StepError, ...]:
-    """Return the errors of steps around h with the inputs of the scene; none if it stops."""
-    if h >= machine.t_end:
-        return ()
-    inputs = {name: own.function for name, own in machine.inputs.items()}
-    try:
-        return step_errors(machine, h, machine.t_end, u=inputs, method=method)
-    except SolveError as error:
-        output.note(f"errors of fixed steps were not measured: {error}")
-        return ()
+    return replace(block, limits=limits), errors, partial(plant_block, source, **how)
 
 
 def online(

@@ -5,7 +5,7 @@ from typing import Any
 
 from symfric.cli import options as opt
 from symfric.cli import output
-from symfric.cli.machines import scenes_with
+from symfric.cli.machines import OwnMachine, scenes_with
 from symfric.cli.options import Strings
 from symfric.fmu import Exported
 from symfric.fmu import export_fmu as exported
@@ -39,18 +39,21 @@ def export_fmu(
     Example: symfric export-fmu drive --law lugre --fmi 2 --out drive.fmu
 
     Example: symfric export-fmu press.py:model --rtol 1e-8
+
+    Example: symfric export-fmu press.py:press --law lugre
     """
     opt.check_outputs(out, json)
-    if ".py" in what:
-        for option, value in {"--law": law, "--preset": preset, "--law-of": law_of}.items():
+    if ".py" in what and law is None:
+        for option, value in {"--preset": preset, "--law-of": law_of}.items():
             if value:
-                raise ValueError(f"{option}: expected none with '{what}', which has its laws")
+                raise ValueError(f"{option}: expected none with '{what}' without --law")
         values = opt.numbers("--set", settings)
         model = opt.held_by_file("export-fmu", what, "model", values, "Model", Model | Scene)
     elif law is None:
         raise ValueError(f"export-fmu {what}: expected --law NAME, got none; such as --law lugre")
     else:
         model = scenes_with(what, {law: opt.named_law(law)}, settings, preset, law_of)[law]
+        model = model.model() if isinstance(model, OwnMachine) else model
     stem = model.name if isinstance(model, Model) else Path(what).stem
     unit = exported(
         model,
@@ -64,7 +67,7 @@ def export_fmu(
         t_end=t_end,
         name=name,
     )
-    output.finish(to_dict(unit), json, lambda: output.show(str(unit)), unit.path)
+    output.finish(to_dict(unit), json, lambda: output.show(str(unit)), (unit.path, None))
 
 
 def to_dict(unit: Exported) -> dict[str, Any]:

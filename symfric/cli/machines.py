@@ -1,35 +1,67 @@
 """Scenes according to command line options: laws, preset, parameters, inputs, start values."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import partial
+from inspect import isclass, signature
+from math import isnan, nan
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, final
 
 import numpy as np
 
 from symfric import Law, Linear, parameters, rate_of, with_values
-from symfric.cli.options import assignments, named_law, numbers
+from symfric.cli.options import assignments, named_in_file, named_law, numbers
 from symfric.foundation import checks
 from symfric.foundation.numeric import Array
 from symfric.foundation.parameters import check_names, options
 from symfric.foundation.units import parsed
 from symfric.integrator import Input
 from symfric.integrator.equations.inputs import Sampled
-from symfric.model import Model
+from symfric.model import Model, Variables
+from symfric.model.model import check_model
 from symfric.scenes import ALL_SCENES, Scene
 
 if TYPE_CHECKING:
     from identification.data.raw import Column, Raw
 
 
+@final
+@dataclass(frozen=True, eq=False, repr=False)
+class OwnMachine(Scene):
+    """Machine of a user's file.
+
+    Attributes:
+        source: FILE.py[:NAME].
+        make: function law -> Model; further arguments with defaults are parameters.
+        values: values of these parameters.
+    """
+
+    t_end: ClassVar[float] = nan
+
+    source: str
+    make: Callable[..., Model]
+    values: Mapping[str, float] = field(default_factory=dict[str, float])
+
+    @property
+    def arguments(self) -> list[str]:
+        """Names of the parameters."""
+        return [*signature(self.make).parameters][1:]
+
+    def equations(self, p: Variables) -> Model:
+        """Return the model of the file."""
+        model = self.make(self.law, **self.values)
+        check_model(f"'{self.source}'", model)
+        return model
+
+
 def kind_of(
     scene: str, where: str = "scene", preset: str | None = None, law_of: Sequence[str] | None = None
 ) -> Callable[[Law], Scene]:
-    """Return a function law -> scene, for a scene by name or the robot of a URDF file.
+    """Return a function law -> scene, for a scene by name, a URDF file or a machine of a file.
 
     Args:
-        scene: name, or FILE.urdf.
+        scene: name, FILE.urdf, or FILE.py[:NAME] of a function law -> Model or a class of scenes.
         where: name of the argument, for messages.
         preset: value of --preset.
         law_of: texts of --law-of.
@@ -45,8 +77,18 @@ def kind_of(
         check_names("--preset of a robot", [preset] if preset else [], ())
         laws = tuple(relative(law) for law in others.values())
         return lambda law: Robot(relative(law), scene, tuple(others), laws)
-    check_names(where, [scene], ALL_SCENES)
-    kind = ALL_SCENES[scene]
+    if ".py" in scene:
+        _, found = named_in_file(where, scene, "machine", callable)
+        if not callable(found):
+            raise checks.refused(f"{where} '{scene}'", "a function law -> Model, or a scene", found)
+        kind: Any = found
+        if not (isclass(found) and issubclass(found, Scene)):
+            check_names(f"--preset of {scene}", [preset] if preset else [], ())
+            check_names(f"--law-of of {scene}", others, ())
+            return partial(OwnMachine, source=scene, make=kind)
+    else:
+        check_names(where, [scene], ALL_SCENES)
+        kind = ALL_SCENES[scene]
     check_names(
         f"--law-of of {scene}", others, kind.places(), "--law is the law of the main contact"
     )
@@ -66,7 +108,7 @@ def scenes_with(
     """Return the scene with each of the laws, by name of the law.
 
     Args:
-        scene: name, or FILE.urdf.
+        scene: see `kind_of`.
         laws: laws by name.
         settings: texts of --set: parameters of the scene and the laws, forms of the laws, and
             structure of the scene; they override a preset.
@@ -110,6 +152,9 @@ def formed(machine: Scene, texts: Mapping[str, str]) -> Scene:
     for name in machine.structures():
         if name in texts:
             own[name] = _structure(f"--set {name}", texts[name], getattr(machine, name))
+    if isinstance(machine, OwnMachine):
+        values = numbers("--set", {n: texts[n] for n in machine.arguments if n in texts})
+        return replace(machine, values=values, **own)
     return replace(machine, **own) if own else machine
 
 
@@ -123,7 +168,8 @@ def _structure(where: str, text: str, like: bool | int) -> bool | int:
 
 def forms(machine: Scene) -> list[str]:
     """Return the names of a scene that --set accepts in addition to parameters."""
-    return [*options(machine.law), *options(machine), *machine.structures()]
+    own = machine.arguments if isinstance(machine, OwnMachine) else machine.structures()
+    return [*options(machine.law), *options(machine), *own]
 
 
 class Driven(NamedTuple):
@@ -180,6 +226,8 @@ def driven(
             signals[name], written[name] = own.function, own.text
     ends = [float(np.max(s.t)) for s in signals.values() if isinstance(s, Sampled)]
     until = max(ends, default=scene.t_end) if t_end is None else t_end
+    if t_end is None and isnan(until):
+        raise ValueError("--t-end: expected the end time of a machine of a file, got none")
     return Driven(signals, written, start | numbers("--x0", x0), until)
 
 

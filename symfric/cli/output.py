@@ -3,6 +3,7 @@
 import json
 import math
 import os
+import shlex
 import sys
 from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from contextlib import contextmanager
@@ -138,13 +139,23 @@ def finish(
     content: Mapping[str, Any],
     json: str | None,
     show: Callable[[], None],
-    *paths: str | Path | None,
+    *files: tuple[Path | None, Callable[..., object] | None],
 ) -> None:
-    """Write JSON, call `show` unless JSON goes to standard output, and print the file names."""
+    """Write files and JSON, call `show` unless JSON goes to standard output, and print file names.
+
+    Args:
+        content: content of the JSON.
+        json: file of the JSON, or "-" for standard output.
+        show: function that prints the result.
+        files: requested files, each with the function `write(path=...)`; None if it is written.
+    """
+    for path, write in files:
+        if path is not None and write is not None:
+            write(path=path)
     emit_json(content, json)
     if json != "-":
         show()
-    say_written(*paths, json)
+    say_written(*(path for path, _ in files), json)
 
 
 def say_written(*paths: str | Path | None) -> None:
@@ -152,3 +163,9 @@ def say_written(*paths: str | Path | None) -> None:
     names = [str(path) for path in paths if path is not None and str(path) != "-"]
     if names:
         note(f"wrote {', '.join(names)}")
+
+
+def command_line() -> str:
+    """Return the command line of this process as one text, for pages."""
+    # in the C locale, Python represents bytes that it cannot decode as lone surrogates
+    return os.fsencode(shlex.join(["symfric", *sys.argv[1:]])).decode(errors="replace")

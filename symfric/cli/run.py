@@ -1,8 +1,5 @@
 """`symfric run` and `symfric report`: simulate a scene with one friction law or several."""
 
-import os
-import shlex
-import sys
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import fields
 from functools import partial
@@ -14,7 +11,7 @@ import numpy as np
 from symfric import Law, SolveError, Trajectory, parameters, simulate
 from symfric.cli import options as opt
 from symfric.cli import output
-from symfric.cli.machines import Driven, driven, scenes_with
+from symfric.cli.machines import Driven, OwnMachine, driven, scenes_with
 from symfric.cli.options import Strings
 from symfric.foundation import checks
 from symfric.integrator import simulate_by_peer
@@ -59,6 +56,8 @@ def run(
     Example: symfric run pendulum_box --law lugre --preset jing_mi_table_7 --plot box.png
 
     Example: symfric run arm.urdf --law lugre --x0 elbow=0.3 --input tau_elbow=2 --csv arm.csv
+
+    Example: symfric run my_machine.py:press --law lugre --t-end 2 --set stroke=0.1
     """
     if peer is not None and (method, backend, max_step, times) != ("auto", "auto", None, None):
         raise ValueError(
@@ -90,8 +89,6 @@ def run(
 
     found = simulated(scene, models, integrate)
     first = found[chosen]
-    if csv:
-        first.to_csv(csv)
     if plot:
         from symfric.results.pictures import plot_trajectories  # noqa: PLC0415  (slow to import)
 
@@ -103,7 +100,8 @@ def run(
             first.animate(movie, progress=tell)
     content = to_dict(chosen, machines[chosen], first) if json else {}
     show = partial(show_runs, found, machines)
-    output.finish(content | {"inputs": given.texts}, json, show, csv, plot, movie)
+    files = (csv, first.to_csv), (plot, None), (movie, None)
+    output.finish(content | {"inputs": given.texts}, json, show, *files)
     refuse_failed(found.values())
 
 
@@ -141,10 +139,8 @@ def report(
             throw=False, progress=tell,
         ),
     )  # fmt: skip
-    # in the C locale, Python represents bytes that it cannot decode as lone surrogates
-    command = os.fsencode(shlex.join(["symfric", *sys.argv[1:]])).decode(errors="replace")
     values = {name: parameters(machine) for name, machine in machines.items()}
-    write_report(found, html, settings=values, command=command)
+    write_report(found, html, settings=values, command=output.command_line())
     output.say_written(html)
     refuse_failed(found.values())
 
@@ -220,7 +216,8 @@ def to_dict(law: str, scene: Scene, trajectory: Trajectory) -> dict[str, Any]:
     found = {
         "scene": trajectory.scene,
         "law": law,
-        "parameters": {name: p.value for name, p in parameters(scene).items()},
+        "parameters": {name: p.value for name, p in parameters(scene).items()}
+        | (dict(scene.values) if isinstance(scene, OwnMachine) else {}),
         "status": trajectory.status.name,
         "message": trajectory.message,
         "statistics": trajectory.statistics.to_dict(),

@@ -3,6 +3,7 @@
 from dataclasses import fields
 from functools import partial
 from inspect import getdoc
+from math import isnan
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,7 @@ from symfric import Law, Viscous, parameters, simulate
 from symfric.cli import options as opt
 from symfric.cli import output
 from symfric.cli.app import TEXTS
-from symfric.cli.machines import driven, scenes_with
+from symfric.cli.machines import OwnMachine, driven, scenes_with
 from symfric.cli.options import Strings
 from symfric.cli.run import refuse_failed, simulated
 from symfric.foundation.numeric import is_number
@@ -70,9 +71,8 @@ def scenes(
         )
         plot_trajectories(run, path=plot)
         refuse_failed(run.values())
-    if schematic:
-        machine.schematic(schematic)
-    return output.finish(found, json, partial(show_scene, found), plot, schematic)
+    files = (plot, None), (schematic, machine.schematic)
+    return output.finish(found, json, partial(show_scene, found), *files)
 
 
 def summary(name: str, machine: Scene) -> dict[str, Any]:
@@ -109,10 +109,10 @@ def to_dict(name: str, machine: Scene, model: Model, law: str | None) -> dict[st
     return {
         "name": name,
         "title": title(machine),
-        "doc": getdoc(type(machine)) or "",
+        "doc": getdoc(machine.make if isinstance(machine, OwnMachine) else type(machine)) or "",
         "python": type(machine).__name__ if name in ALL_SCENES else None,
         "law": law,
-        "t_end": machine.t_end,
+        "t_end": None if isnan(machine.t_end) else machine.t_end,
         "states": [_variable(v) for v in whole.x],
         "inputs": inputs,
         "integrals": dict(machine.integrals),
@@ -178,7 +178,8 @@ TABLES = {
 def show_scene(found: dict[str, Any]) -> None:
     """Print the docstring and the tables of one scene."""
     output.show_doc(found["doc"])
-    output.show(f"Default end time: {found['t_end']:g} s.")
+    if found["t_end"] is not None:
+        output.show(f"Default end time: {found['t_end']:g} s.")
     if found["python"]:
         output.show(f"In Python: from symfric.scenes import {found['python']}")
     output.show()

@@ -6,7 +6,6 @@ from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
-from inspect import signature
 from os import cpu_count
 from pathlib import Path
 from textwrap import fill
@@ -24,7 +23,7 @@ from symfric.choice.ranking import LEGEND, lines
 from symfric.cli import options as opt
 from symfric.cli import output
 from symfric.cli.identify import reader, residuals_of
-from symfric.cli.machines import kind_of, settable, with_set
+from symfric.cli.machines import OwnMachine, kind_of, settable, with_set
 from symfric.cli.options import Strings
 from symfric.figures.data import phenomena
 from symfric.foundation import checks
@@ -85,10 +84,7 @@ def select(
     given = opt.assignments("--set", settings)
     levels = opt.numbers("--set", {n: given.pop(n) for n in OF_FRICTION if n in given})
     candidates, formed_by_user = _candidates(opt.laws_of(law or [*ALL_LAWS]), given)
-    if ".py" in scene:
-        machine: Any = function_of_file("select", scene, opt.numbers("--set", given))
-    else:
-        machine = _with(kind_of(scene, preset=preset, law_of=law_of), scene, given)
+    machine = _with(kind_of(scene, preset=preset, law_of=law_of), scene, given)
     misfits = None
     if data:
         records = reader(columns, units, kind, missing, resample, drive=drive)(data)
@@ -110,11 +106,9 @@ def select(
             workers=cpu_count() or 1 if workers is None else workers,
             progress=tell,
         )
-    for path, write in ((csv, found.to_csv), (plot, found.plot), (html, found.to_html)):
-        if path:
-            write(path)
     text = "\n".join([*lines(found), "", fill(LEGEND, 80)])
-    output.finish(found.to_dict(), json, partial(typer.echo, text), plot, html, csv)
+    files = (plot, found.plot), (html, found.to_html), (csv, found.to_csv)
+    output.finish(found.to_dict(), json, partial(typer.echo, text), *files)
     if found.interrupted:
         raise SolveError("select: interrupted", Status.INTERRUPTED, found)
     if found.best is None:
@@ -181,25 +175,17 @@ def _candidates(named: dict[str, Law], given: dict[str, str]) -> tuple[dict[str,
     return laws, chosen
 
 
-def function_of_file(where: str, text: str, values: dict[str, float]) -> Callable[..., Any]:
-    """Return the callable FILE.py[:NAME], with the numbers of --set as keyword arguments."""
-    _, found = opt.named_in_file(where, text, "machine", callable)
-    if not callable(found):
-        raise checks.refused(f"{where} '{text}'", "a function law -> Model, or a scene", found)
-    first, *others = signature(found).parameters or [""]
-    check_names(f"--set of {text}, a function of {first}", values, others)
-    return partial(found, **values) if values else found
-
-
 def _with(kind: Callable[[Law], Scene], scene: str, texts: dict[str, str]) -> Any:
     """Return the scene with its settings in --set: parameters, forms and structure."""
-    if not texts:
-        return kind
     one = kind(Coulomb())
     of_law = parameters(one.law)
     known = [n for n in settable(one, texts) if n not in of_law]
     check_names(f"--set of {scene}", texts, [*known, *OF_FRICTION])
-    with_set(one, texts)  # refuses bad values
+    one = with_set(one, texts)  # refuses bad values
+    if isinstance(one, OwnMachine):
+        return partial(one.make, **one.values)
+    if not texts:
+        return kind
 
     def machine(law: Law) -> Scene:
         return with_set(kind(law), texts)

@@ -13,9 +13,10 @@ from symfric.dynamics.linear import NEUTRAL, SLOWEST
 from symfric.dynamics.orbit import NEUTRAL as UNDECIDED
 from symfric.dynamics.orbit import PeriodicOrbit, guessed, periodic_orbit
 from symfric.foundation import checks
+from symfric.foundation.files import write_text
 from symfric.foundation.numeric import Array
 from symfric.foundation.parameters import check_names
-from symfric.foundation.shown import Showing, Shown, TextTable, among
+from symfric.foundation.shown import Showing, Shown, TextTable, among, data_uri
 from symfric.integrator import Ensemble, Input
 from symfric.model import Model
 from symfric.results.stored import Format
@@ -229,6 +230,32 @@ class Branch(Showing):
             ],
             "message": self.message,
         }
+
+    def to_html(
+        self, path: str | Path, *others: "Branch", state: str | None = None, command: str = ""
+    ) -> None:
+        """Write a self-contained HTML page with the diagram and the special points.
+
+        Args:
+            path: HTML file.
+            others: further branches on the page.
+            state: name of the state on the ordinate; default: the first one.
+            command: command line that repeats the analysis.
+
+        Raises:
+            ValueError: an unknown state.
+        """
+        from symfric.page import html  # noqa: PLC0415  (slow to import)
+
+        drawn = self.plot(self.model.x[0].name if state is None else state, *others)
+        image = f'<img src="{data_uri(drawn, dpi=150)}" alt="bifurcation diagram">'
+        title = f"'{self.model.name}' over {self.parameter}"
+        parts = [html.title(title), html.figure(image)]
+        for k, branch in enumerate((self, *others)):
+            shown = branch.shown()
+            table = html.table("", shown.table.header, shown.table.rows, (1, 2))
+            parts += [html.section(f"branch{k}", shown.title, html.bullets(shown.lines), table)]
+        write_text(path, html.page(title, "en", "\n".join([*parts, html.code(command)])))
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write the branch to one file, from which `load_branch` restores it exactly."""

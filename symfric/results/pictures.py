@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+import casadi as ca
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 
 from symfric.foundation import checks
 from symfric.foundation.numeric import Array
-from symfric.foundation.panels import panels, save
+from symfric.foundation.panels import NARROW, panels, save
 from symfric.foundation.panels import panels as empty_panels
 from symfric.foundation.shown import spaced
 from symfric.foundation.style import COLOURS, EDGE, colour, line
@@ -166,6 +167,16 @@ def level(axis: Axes, values: Sequence[Array]) -> None:
     if np.isfinite(size) and high - low <= FLAT * size:
         middle = (low + high) / 2
         axis.set_ylim(middle - (0.2 * size or 1.0), middle + (0.2 * size or 1.0))
+
+
+def plot_points(run: Signals, x: str, y: str, times: Array, path: str | Path | None) -> Figure:
+    """Plot two signals at single times as points."""
+    figure, (axis,) = panels(1, width=NARROW, height=3.0)
+    expressions = [run.model.expression(name) for name in (x, y)]
+    axis.plot(*run.of(ca.vertcat(*expressions), times), ".", markersize=4.0, color=colour(0))
+    axis.set_xlabel(f"{x} [{run.unit(x)}]")
+    axis.set_ylabel(f"{y} [{run.unit(y)}]")
+    return save(figure, path)
 
 
 def _small(

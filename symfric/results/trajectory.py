@@ -190,8 +190,8 @@ class Trajectory(packed.Portable, Signals):
         crossing from which on every return holds.
 
         Args:
-            expression: scalar SX, or the name of a signal; by default the state with the largest
-                range, relative to its nominal value, minus the middle of its range.
+            expression: scalar SX, or the name of a signal; by default the state of the machine with
+                the largest range, relative to its nominal value, minus the middle of its range.
             tolerance: largest difference of a state between two returns, relative to its range.
 
         Raises:
@@ -255,6 +255,34 @@ class Trajectory(packed.Portable, Signals):
         from symfric.results.pictures import plot_trajectories  # noqa: PLC0415  (slow to import)
 
         return plot_trajectories({label or self.scene: self}, names, path, panels, log)
+
+    def plot_section(
+        self, x: str, y: str, expression: Scalar, direction: int = 1,
+        path: str | Path | None = None,
+    ) -> "Figure":  # fmt: skip
+        """Plot two signals where an expression passes through zero, a Poincare section.
+
+        Points on a curve show a quasi-periodic motion, and a few separate points a periodic one.
+
+        Args:
+            x, y: names of signals or details on the abscissa and the ordinate.
+            expression, direction: as in `crossings`; "x" crosses at x = 0, and
+                ca.sin(w * model.t) once a period of an input.
+            path: image file.
+
+        Raises:
+            ValueError: as in `crossings`, or the expression never crosses zero.
+        """
+        from symfric.results.pictures import plot_points  # noqa: PLC0415  (slow to import)
+
+        self.check([x, y])
+        times = self.crossings(expression, direction)
+        if not times.size:
+            raise ValueError(
+                f"{self._where}: plot_section: expected an expression that crosses zero, got none; "
+                "simulate longer, or subtract a value that the motion passes"
+            )
+        return plot_points(self, x, y, times, path)
 
     def animate(
         self,

@@ -215,7 +215,6 @@ def test_pages_of_an_earlier_build_are_removed(
         ("symfric/gallery/shared.py", lambda name: True),
         ("symfric/gallery/self_tuning/machines.py", lambda name: name.startswith("self_tuning/")),
         ("symfric/gallery/self_tuning/__init__.py", lambda name: name.startswith("self_tuning/")),
-        ("symfric/gallery/pages.py", lambda name: False),
     ],
 )
 def test_a_figure_depends_on_its_paper_and_on_shared_code(

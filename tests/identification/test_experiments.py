@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tables import sampled
 
 from identification import Dataset, Fit, InverseDynamics, Points, cross_validate, plateaus
 from identification.result.page import page_of
@@ -22,7 +23,7 @@ def at_speed(v: float, jitter: float, count: int = 100) -> Dataset:
     )
 
 
-@pytest.mark.parametrize("jitter", [0.0, 0.01])
+@pytest.mark.parametrize("jitter", sampled([0.01, 0.0], of=2))
 def test_one_record_for_each_speed_is_a_curve(jitter: float) -> None:
     size = np.array([0.02, 0.05, 0.1, 0.2, 0.4, 0.8, 1.2])
     some = [at_speed(v, jitter) for v in np.concatenate([-size, size]).tolist()]

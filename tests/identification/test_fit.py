@@ -5,6 +5,7 @@ import subprocess
 import sys
 from typing import Any
 
+import casadi as ca
 import numpy as np
 import pytest
 from scipy.special import stdtrit
@@ -16,6 +17,7 @@ from identification.residuals.inverse import InverseDynamics
 from identification.residuals.points import Points
 from identification.residuals.shooting import Shooting
 from identification.unknowns.spec import above, log, tied
+from symfric import Model, Variable, contact, simulate
 from symfric.foundation.status import SolveError, Status
 from symfric.laws import Coulomb, Dahl, Stribeck, Sum, Viscous
 from symfric.laws.composed.populations import steady_force
@@ -183,3 +185,27 @@ def test_processes_side_by_side_agree_to_the_bit(capsys: pytest.CaptureFixture[s
         check=True,
     )  # fmt: skip
     assert here == there.stdout and here.strip()
+
+
+@pytest.mark.parametrize(("N", "mu_s", "v_s", "rate"), [(50, 0.2, 0.05, 1000), (9, 0.3, 0.1, 600)])
+def test_intervals_of_simulated_records_contain_the_truth(
+    N: float, mu_s: float, v_s: float, rate: int
+) -> None:
+    """The acceleration jumps at reversals, where the static level is determined."""
+    law = Stribeck(mu_s=mu_s, mu_d=0.15, v_s=v_s)
+    x, v, force = Variable("x", "m"), Variable("v", "m/s"), Variable("force", "N")
+    guide = contact("guide", law, v, N)
+    stage = Model(
+        "stage", x=(x, v), u=(force,), ode=ca.vertcat(v, (force - guide.force) / 3.0),
+        contacts=(guide,),
+    )  # fmt: skip
+    push = {"force": lambda t: N * (0.4 * ca.sin(6 * t) + 0.3 * ca.sin(17 * t))}
+    run = simulate(stage, 5.0, u=push, samples=5 * rate + 1)
+    data = Dataset.of(t=run.t, x=run["x"], v=run["v"], force=run["force"])
+    fit = Fit(InverseDynamics(), "stribeck", data, normal_force=N).solve()
+    assert fit.status is Status.SOLVED
+    for name, value in {"m": 3.0, "mu_s": mu_s, "mu_d": 0.15, "v_s": v_s}.items():
+        found = fit.parameters[name]
+        assert found.low is not None and found.high is not None
+        assert found.low <= value <= found.high
+        assert found.value == pytest.approx(value, rel=0.01)

@@ -1,6 +1,5 @@
 """Compilers that the tests of generated C run with; a test is skipped where one is missing."""
 
-import shutil
 from collections.abc import Iterator
 
 import pytest
@@ -18,26 +17,9 @@ def fewer_steps_verified() -> Iterator[None]:
         yield
 
 
-STEPS = {"STEPS": verification.STEPS, "FEWER": verification.FEWER}
-
-
-@pytest.fixture
-def all_steps_verified(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Verify as many steps as users do."""
-    for name, steps in STEPS.items():
-        monkeypatch.setattr(verification, name, steps)
-
-
 @pytest.fixture(scope="session")
 def compiler() -> Compiler:
     found = find_compiler()
     if found is None:
         pytest.skip("no C compiler on this machine")
     return found
-
-
-@pytest.fixture(scope="session", params=["gcc", pytest.param("clang", marks=pytest.mark.slow)])
-def each_compiler(request: pytest.FixtureRequest) -> str:
-    if shutil.which(request.param) is None:
-        pytest.skip(f"no {request.param} on this machine")
-    return request.param

@@ -26,7 +26,7 @@ from tables import table
 import ocp
 import symfric as sf
 from identification import Dataset, Fit, InverseDynamics, Shooting, synthetic_drive_data
-from symfric import figures
+from symfric import compensation, figures
 from symfric import multibody as mb
 from symfric.codegen import law_block, plant_block
 from symfric.figures import compare
@@ -351,3 +351,16 @@ def test_messages_name_the_correct_call() -> None:
     names = {"BELT": sf.rabinowicz(law), "DRIVEN": sf.drive(law), "Rabinowicz": Rabinowicz}
     table = Path(__file__).with_name("stumbles.toml")
     assert not_refused(table, sf=sf, math=math, Mechanism=Mechanism, **names) == []
+
+
+def test_compensation_and_drives_refuse_bad_input() -> None:
+    law, noisy = LuGre(mu_s=6.0, mu_d=4.0), {"mass": 1.0, "noise": 1e-4}
+    plant = sf.drive(law, m=1.0, N=1.0, free=["mu_d"])
+    names = {
+        "BRISTLES": law, "NOISY": noisy, "ROW": np.ones(10), "DRIVEN": sf.drive(LuGre()),
+        "ESTIMATOR": compensation.recursive_estimator(law, **noisy, h=1e-3),
+        "LOOP": (plant, compensation.sine(0.02, 0.5, 0.1), compensation.compensator(law)),
+        "AXIS": sf.Drive(torque_constant=0.12, gear_ratio=-2, lead=5e-3),
+    }  # fmt: skip
+    table = Path(__file__).with_name("refusals.toml")
+    assert not_refused(table, compensation, sf=sf, math=math, **names) == []

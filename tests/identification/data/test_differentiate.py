@@ -105,7 +105,7 @@ def test_noise_of_the_position_narrows_the_filter() -> None:
     wide, narrow = (
         choose_filter(force, 1e-3, [position_band(x + s * noise, 1e-3)]) for s in (0.0, 1e-2)
     )
-    assert (wide.cutoff, wide.decimation) == (100.0, 10)
+    assert (wide.cutoff, wide.decimation) == (250.0, 10)  # motion is known up to Nyquist / 2
     assert narrow.cutoff < wide.cutoff
     assert narrow.decimation > wide.decimation
 
@@ -168,12 +168,13 @@ def test_velocity_and_acceleration_of_a_sine() -> None:
     np.testing.assert_allclose(found.a, -(W**2) * np.sin(W * found.t), atol=1e-3 * W**2)
 
 
-def test_acceleration_falls_short_by_a_twelfth_of_the_square() -> None:
-    """Of a sine with w h = 0.2: 1 - (w h)^2 / 12; a difference of differences loses a third."""
-    w = 200.0
+def test_acceleration_falls_short_by_the_fourth_power() -> None:
+    """Of a sine with w h = 0.4: 1 - (w h)^4 / 90."""
+    w = 400.0
     fast = differentiate(record(x=np.sin(w * T), force=WAVE["force"]), Filter(400.0))
-    size = np.sqrt(2 * np.mean(fast.a**2)) / w**2
-    assert 1 - size == pytest.approx(0.2**2 / 12, rel=0.1)
+    wave = np.sin(w * fast.t)
+    size = -float(fast.a @ wave / (wave @ wave)) / w**2
+    assert 1 - size == pytest.approx(0.4**4 / 90, rel=0.1)
 
 
 def test_equations_that_touch_slow_samples_are_left_out() -> None:

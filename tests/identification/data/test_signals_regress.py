@@ -147,15 +147,15 @@ def test_a_velocity_that_contradicts_the_position_does_not_count(v: Array) -> No
 
 
 def test_of_a_fast_motion_the_difference_of_positions_is_not_believed() -> None:
-    """At w h = 0.19 it falls short by (w h)^2 / 6, and not the measured velocity too far."""
-    w = 2 * np.pi * 30
+    """At w h = 0.5 it falls short by (w h)^4 / 30, and not the measured velocity too far."""
+    w = 2 * np.pi * 80
     x, v = np.sin(w * T), w * (np.cos(w * T) + 1e-3 * noise(1))
     mixed, alone = (
-        float(np.std((derivatives(x, y, STEP, Filter(200.0), Velocity.of(x, y, STEP))[1]
+        float(np.std((derivatives(x, y, STEP, Filter(400.0), Velocity.of(x, y, STEP))[1]
                       - w * np.cos(w * T))[INSIDE]))
         for y in (v, None)
     )  # fmt: skip
-    assert alone > 0.9 * w * (w * STEP) ** 2 / 6 / np.sqrt(2)
+    assert alone > 0.9 * w * (w * STEP) ** 4 / 30 / np.sqrt(2)
     assert mixed < 0.3 * alone
 
 

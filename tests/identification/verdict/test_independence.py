@@ -12,9 +12,8 @@ from tables import sampled
 from identification.data.dataset import Dataset
 from identification.fit import Fit
 from identification.residuals.points import Points
-from identification.verdict.colour import whiteness
+from identification.verdict.colour import positions, whiteness
 from identification.verdict.judge import ALARM, judge
-from identification.verdict.minimum import positions
 from symfric import LuGre
 from symfric.foundation.status import Status
 

@@ -8,8 +8,7 @@ from linear_fits import ar1, coulomb, fitted
 from scipy.stats import t as student
 from tables import sampled
 
-from identification.verdict.colour import Colour, colour, predictors, whitened
-from identification.verdict.minimum import places, positions
+from identification.verdict.colour import Colour, colour, places, positions, predictors, whitened
 
 
 def test_white_noise_gives_the_textbook_covariance() -> None:
@@ -62,6 +61,24 @@ def test_intervals_cover(rho: float) -> None:
         reach = student.ppf(0.975, found.freedom) * np.sqrt(np.diag(found.coloured))
         inside += np.abs(made.values) <= reach
     assert ((inside / seeds >= 0.9) & (inside / seeds <= 0.99)).all()
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.6])
+def test_intervals_cover_a_value_in_rows_with_larger_noise(rho: float) -> None:
+    """A peak in 16 of 200 rows, with six times the noise; equal variances cover half as often."""
+    seeds, peak = 100, np.zeros(200)
+    peak[20::25] = peak[21::25] = np.linspace(0.5, 1.5, 8)
+    J, size = np.column_stack([coulomb(200), peak]), np.where(peak > 0, 6.0, 1.0)
+    inside, named = np.zeros(2), 0
+    for seed in range(seeds):
+        made = fitted(J, size * ar1(200, rho, seed))
+        found, off = made.sandwich, abs(made.values[-1])
+        named += found.uneven[-1]
+        for k, (C, freedom) in enumerate([(found.coloured, found.freedom), (found.white, [195.0])]):
+            inside[k] += off <= student.ppf(0.975, freedom[-1]) * np.sqrt(C[-1, -1])
+    assert 0.9 <= inside[0] / seeds <= 0.99
+    assert inside[1] / seeds < 0.7
+    assert named > 0.95 * seeds
 
 
 def test_windows_share_the_noise_of_time() -> None:

@@ -379,17 +379,3 @@ def test_events_of_a_model_may_start_sliding() -> None:
     motion = set_valued(model, 3.0)
     assert motion.final() == {"x": pytest.approx(0.5, abs=1e-9), "v": 0.0}
     assert kinds(motion, "guide") == ["stick", *2 * ["slip+", "stick"]]
-
-
-def test_bad_input_is_refused() -> None:
-    model = drive(LAW)
-    cases: list[tuple[Any, str]] = [
-        (lambda: set_valued(model, 1.0, modes={"belt": 0}), "modes: expected .*got belt"),
-        (lambda: set_valued(model, 1.0, u={"push": 0.0}), "got push"),
-        (lambda: set_valued(model, 1.0, u={"force": "1"}), "input 'force': expected"),
-        (lambda: set_valued(driven_twice(), 1.0), "got arm, slide at rest together"),
-        (lambda: set_valued(LAW, 1.0), "set_valued: expected a model"),  # type: ignore[arg-type]
-    ]
-    for call, message in cases:
-        with pytest.raises(ValueError, match=message):
-            call()

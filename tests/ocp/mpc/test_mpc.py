@@ -9,14 +9,14 @@ import pytest
 from backends import needs_compiler
 from receding import controller, linear_model, positioning, rubbing
 
-from ocp.formulation.expressions import at_end, effort, integral, track
-from ocp.formulation.phase import Free, Phase
+from ocp.formulation.expressions import at_end, effort, track
+from ocp.formulation.phase import Phase
 from ocp.formulation.problem import Problem
 from ocp.mpc.closed_loop import ClosedLoopRun, Optimality
 from ocp.mpc.controller import Controller, controller_of
 from ocp.mpc.design import CycleData, CycleStatus
 from ocp.problems import cart_pendulum
-from symfric import ExactCoulomb, LuGre, drive, rabinowicz
+from symfric import ExactCoulomb, LuGre, drive
 from symfric.foundation.programs import CompileError, find_compiler
 from symfric.model import Model
 
@@ -145,39 +145,6 @@ def test_bounds_at_run_time_hold() -> None:
     assert not crossed.converged
 
 
-def phase(**changes: object) -> Phase:
-    return Phase(**({"model": rubbing(), "T": 0.2} | changes))
-
-
-@pytest.mark.parametrize(
-    ("problem", "message"),
-    [
-        (lambda: Problem(phase(T=Free(0.1, 1.0)), effort("force")), "a fixed duration T"),
-        (lambda: Problem(phase(T=0.205), effort("force")), "whole number of steps"),
-        (lambda: Problem(phase() >> phase(), effort("force")), "one phase"),
-        (lambda: Problem(phase()), "a cost"),
-        (lambda: Problem(phase(end={"force": 0.0}), effort("force")), "no values of inputs"),
-        (lambda: Problem(phase(), integral(lambda s: s.force**4)), "second derivative"),
-        (lambda: Problem(phase(), at_end(lambda s: -(s.x**2))), "convex"),
-        (lambda: positioning(drive(ExactCoulomb())), "events"),
-        (lambda: Problem(phase(via={0.5: {"x": 0.1}}), effort("force")), "via points"),
-    ],
-)  # fmt: skip
-def test_unsupported_problems_are_refused(problem: object, message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        controller_of(problem(), 0.01)
-
-
-def test_wrong_names_and_sizes_are_refused() -> None:
-    session = controller().start()
-    with pytest.raises(ValueError, match="all of x, v, got none for v"):
-        session.step({"x": 0.0})
-    with pytest.raises(ValueError, match="expected one of goal, got gaol; did you mean goal"):
-        session.step([0.0, 0.0], {"gaol": 1.0})
-    with pytest.raises(ValueError, match="expected 1 number or 21"):
-        session.step([0.0, 0.0], {"goal": np.zeros(5)})
-
-
 # --- closed loops -------------------------------------------------------------------------------
 
 BRISTLES = LuGre(mu_s=6.0, mu_d=4.0, v_s=1e-2, sigma_0=1e5, sigma_1=300.0, sigma_2=0.0)
@@ -226,11 +193,6 @@ def test_run_has_a_table_a_plot_and_a_file(tmp_path: Path) -> None:
     assert len(rows) == 4
     found.plot("x", "force", path=tmp_path / "loop.png")
     assert (tmp_path / "loop.png").stat().st_size > 1000
-
-
-def test_plant_without_the_signals_is_refused() -> None:
-    with pytest.raises(ValueError, match="inputs of plant 'rabinowicz'"):
-        controller().simulate(rabinowicz(LuGre()), 0.1, {"goal": 0.1})
 
 
 def cart(v_t: float) -> Model:

@@ -3,8 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
-from types import SimpleNamespace
-from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -94,9 +92,6 @@ def test_guess_is_a_number_samples_or_a_function_of_time(given: Guess) -> None:
     assert (initial_points(into, {"v": 2.0}).spans[1].nodes[1] == 2.0).all()
 
 
-WHAT = "guess: expected values by name, a solution, a run, or points"
-
-
 def test_runs_are_guesses() -> None:
     """x = t^2 within 1.5 s is stretched to a given duration; a free one starts with 1.5 s."""
     fall = Model("fall", x=(UNIT.x[0], UNIT.x[1]), ode=ca.vertcat(UNIT.x[1].symbol, 2.0))
@@ -110,33 +105,6 @@ def test_runs_are_guesses() -> None:
     found = solve_once(unit_move(), 5)
     again = initial_points(on(unit_move(), 5), found.motions[0]).spans[0]
     np.testing.assert_allclose(again.nodes, found.points.spans[0].nodes, atol=1e-2)
-
-
-def run_of(t: list[float], **signals: list[float]) -> Any:
-    return SimpleNamespace(t=t, signals=signals)
-
-
-@pytest.mark.parametrize(
-    ("guess", "message"),
-    [
-        ({"w": 1.0}, "guess: expected one of x, v, a, got w"),
-        ({"x": np.nan}, "guess of x: expected finite numbers, got nan"),
-        ({"x": []}, r"guess: expected for x a number, samples, or a function .* shape \(0,\)"),
-        ({"x": np.ones((2, 2))}, r"got an array of shape \(2, 2\)"),
-        ({"a": lambda t: t[:3]}, r"guess: expected for a a number.* shape \(3,\)"),
-        (initial_points(on(unit_move(), 7)), r"expected points of 1 phases, .* shape \(2, 7\)"),
-        (initial_points(on(there_and_back(), 6)), "guess: .* got points of other meshes or models"),
-        (run_of([0.0, 1.0, 0.5]), "guess: times of the run: expected increasing times"),
-        (run_of([0.0]), "guess: times of the run: expected increasing times"),
-        (run_of([0.0, 1.0], w=[0.0, 1.0]), "signals of the run: expected one of x, v, a, .*'w'"),
-        (run_of([0.0, 1.0], x=[0.0]), "signals of the run: .* with a value for each time"),
-        (5, WHAT),
-        ("move.npz", rf"{WHAT}, got 'move\.npz'; a file is read by ocp\.load\(path\)"),
-    ],
-)
-def test_bad_guesses_are_refused(guess: Any, message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        start_of(on(unit_move(), 6), guess)
 
 
 def test_points_are_a_guess() -> None:

@@ -162,7 +162,7 @@ def test_verdicts_and_coverage_are_counted_and_drawn(monkeypatch: pytest.MonkeyP
 def test_some_files_end_as_they_should() -> None:
     expected = {"MATLAB struct": "right", "MATLAB, cut off": "refused", "empty cell": "refused"}
     chosen = {f.name: f for f in islice(campaign(), 32) if f.name in expected}
-    assert {name: outcome(file).kind for name, file in chosen.items()} == expected
+    assert {name: outcome(file) for name, file in chosen.items()} == expected
 
 
 @pytest.mark.slow

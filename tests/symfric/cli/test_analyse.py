@@ -23,10 +23,12 @@ def ring(law):
 
 def test_a_run_leads_to_the_grazing(symfric) -> None:
     line = "analyse rabinowicz --law exact_coulomb --set sigma_2=0.1 --over v_belt=0.1:0.5"
-    out = symfric(f"{line} --longest 0.1 --plot p.png --save b.npz --json b.json").out
+    out = symfric(f"{line} --longest 0.1 --plot p.png --html p.html --save b.npz --json b.json").out
     assert "grazing" in out and "0.39024" in out
     branch = load_branch("b.npz")
     assert branch.special[0].kind == "grazing" and Path("p.png").stat().st_size > 1000
+    page = Path("p.html").read_text(encoding="utf-8")
+    assert "0.3902" in page and "data:image/png" in page and "<h2>branch of" in page
     (found,) = json.loads(Path("b.json").read_text(encoding="utf-8"))["branches"]
     assert found["special"][0]["value"] == pytest.approx(branch.special[0].value, rel=1e-12)
     assert found["values"] == branch.values.tolist() and found["kind"] == "orbits"

@@ -6,6 +6,7 @@
 import csv
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -39,6 +40,64 @@ CASES = {
         x0={"hinge": 1.2}, u={"tau_hinge": 1.0},
     ),
 }  # fmt: skip
+
+
+MACHINES = """
+import casadi as ca
+from symfric import LuGre, Model, Variable, contact
+from symfric.scenes import Rabinowicz
+def sled(law, m=2.0, pull=0.02):
+    s, v, u = Variable("s", "m"), Variable("v", "m/s"), Variable("u", "m/s", start=pull)
+    slip = contact("ground", law, v, m * 9.81)
+    rates = ca.vertcat(u - v, (50 * s - slip.force) / m)
+    return Model("sled", x=(s, v), u=(u,), ode=rates, contacts=(slip,))
+def number(law):
+    return 3
+Belt = Rabinowicz
+model = sled(LuGre())
+"""
+OF_FILE = {
+    "run m.py:sled --law lugre --t-end 3 --set m=3 --set mu_s=0.3 --input u=0.02 --json -": "sled",
+    "run m.py:Belt --law lugre --set k=5 --t-end 3 --json -": "rabinowicz",
+    "run m.py:sled --law lugre --t-end 3 --plot a.png": "sled with lugre, 0 ... 3 s",
+    "report m.py:sled --law lugre,viscous --t-end 1 --input u=0.02": "wrote report.html",
+    "scenes m.py:sled --law lugre": "bristle stiffness",
+    "export-fmu m.py:sled --law lugre --set m=3 --out s.fmu": "wrote s.fmu",
+    "codegen --scene m.py:sled --law stribeck --step-size 1e-3 --out c": "sled_f64.c",
+    "select m.py:sled --law stribeck,coulomb --no-fixed-steps --t-end 1": "stribeck",
+    "analyse m.py:sled --law viscous --over u=0.01:0.1 --from equilibrium": "to 0.1",
+}
+REFUSED = {
+    "run m.py:sled --law lugre": "--t-end: expected the end time",
+    "run m.py:number --law lugre --t-end 1": "'m.py:number': expected a model",
+    "run m.py:model --law lugre --t-end 1": "expected a function law -> Model",
+    "run m.py:none --law lugre --t-end 1": "it holds sled, number",
+    "run m.py:sled --law lugre --t-end 1 --set q=1": "v_eps, m, pull, got q",
+    "run m.py:sled --law lugre --t-end 1 --preset haug": "--preset of m.py:sled",
+    "run m.py:sled --law lugre --t-end 1 --law-of hinge=dahl": "--law-of of m.py:sled",
+    "select m.py:sled --law lugre,stribeck": "the end of the motion",
+    "analyse m.py:sled --law lugre --over m=1:3": "a parameter p of the model",
+}
+
+
+@pytest.mark.parametrize("line", OF_FILE)
+def test_a_machine_of_a_file_is_a_scene(line: str, symfric) -> None:
+    Path("m.py").write_text(MACHINES)
+    said = symfric(line)
+    assert OF_FILE[line] in said.out + said.err
+    if "--set m=3" in line and "--json" in line:
+        found, law = said.json, LuGre(mu_s=0.3)
+        space: dict[str, Any] = {}
+        exec(MACHINES, space)
+        expected = simulate(space["sled"](law, m=3.0), 3.0, u={"u": 0.02})
+        assert found["final"] == expected.final
+        assert (found["parameters"]["m"], found["parameters"]["mu_s"]) == (3.0, 0.3)
+
+
+def test_machines_of_a_file_that_are_none_are_refused(symfric) -> None:
+    Path("m.py").write_text(MACHINES)
+    for line, text in REFUSED.items():
+        assert text in " ".join(symfric(line, 2).err.split()), line
 
 
 @pytest.mark.parametrize("line", CASES)

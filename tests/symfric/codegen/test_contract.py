@@ -206,7 +206,11 @@ FORCES = {
     [(20_000, True), pytest.param(10_000_000, True, marks=pytest.mark.slow),
      pytest.param(10_000_000, False, marks=pytest.mark.slow)],
 )  # fmt: skip
-@pytest.mark.parametrize("name", FORCES)
+@pytest.mark.parametrize(
+    "name",
+    [n if n in ("lugre", "events", "reference", "gms_observer")
+     else pytest.param(n, marks=pytest.mark.slow) for n in FORCES],
+)  # fmt: skip
 def test_no_bits_cause_a_force_beyond_its_limit(name, steps, fast, compiler):
     """With `fast`, the compiler assumes that NaN does not occur."""
     for real in ("float", "double") if steps > 20_000 else ("float",):

@@ -22,8 +22,9 @@ def test_a_driven_oscillator_has_its_resonance() -> None:
     assert branch.orbit(5).driven and not branch.special
 
 
-@pytest.mark.parametrize("in_equations", [True, False])
-@pytest.mark.parametrize("rate", [2.0, 2e-6, 2e6])
+@pytest.mark.parametrize(
+    ("in_equations", "rate"), [(True, 2e-6), (True, 2e6), (False, 2.0), (False, 2e6)]
+)
 def test_what_is_no_period_of_the_drive_is_refused(in_equations: bool, rate: float) -> None:
     """After 3 / rate the states may return, but the motion does not repeat."""
     x, v = Variable("x", "m"), Variable("v", "m/s", nominal=rate)

@@ -34,7 +34,9 @@ def test_instructions_are_counted_one_by_one():
 
 @on_target
 @pytest.mark.heavy
-@pytest.mark.parametrize("core", CORES)
+@pytest.mark.parametrize(
+    "core", [c if c in ("m0plus", "m7") else pytest.param(c, marks=pytest.mark.slow) for c in CORES]
+)
 def test_every_core_agrees_with_the_host(core):
     found = measure(law_block(VelocityBased()), core=core, steps=100)
     assert found.ok
@@ -51,7 +53,7 @@ def test_double_has_the_bits_of_the_host():
 
 
 @on_target
-@pytest.mark.heavy
+@pytest.mark.slow
 def test_casadi_calls_functions_of_double():
     block = law_block(LuGre())
     own = measure(block, steps=100, guards=False)

@@ -18,8 +18,6 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from oracles import rabinowicz_brown_mcphee, rabinowicz_lugre
-from stored import stored
 
 import symfric as sf
 from symfric.foundation.numeric import Array
@@ -59,29 +57,6 @@ def test_errors_are_those_requested_and_fall_with_the_tolerance(name: str, metho
     assert all(tighter < looser for looser, tighter in pairwise(errors))
     steps = [run.statistics.steps for run in runs]
     assert all(tighter > looser for looser, tighter in pairwise(steps))
-
-
-@pytest.mark.parametrize(
-    ("name", "rates", "start"),
-    [
-        ("brown_mcphee", rabinowicz_brown_mcphee(), [0.0, 0.0]),
-        ("lugre", rabinowicz_lugre(), [0.0, 0.0, -0.1 * 0.8 * 9.81 / 1e5]),
-    ],
-)
-def test_solution_is_that_of_scipy(name: str, rates: object, start: list[float]) -> None:
-    """Radau IIA of order 5 on a right-hand side in plain Python."""
-    times = np.linspace(0, SPAN, 201)
-    atol = [1e-13, 1e-13, 1e-17][: len(start)]
-
-    def compute() -> Array:
-        from scipy.integrate import solve_ivp  # noqa: PLC0415
-
-        return solve_ivp(rates, (0, SPAN), start, "Radau", times, rtol=1e-10, atol=atol).y
-
-    scipy = stored(f"stick_slip_{name}", compute)
-    ours = sf.simulate(MODELS[name], SPAN, rtol=1e-10, t_eval=times)
-    assert deviation(ours["x"], scipy[0]) < 1e-9
-    assert deviation(ours["v"], scipy[1]) < 1e-8
 
 
 @cache
@@ -352,15 +327,3 @@ def test_event_is_found_where_it_is(method: str) -> None:
     run = sf.simulate(model, 5.0, rtol=1e-9, method=method)
     assert run.happened[-1][0] == pytest.approx(3 / 5.6, rel=1e-7)
     assert run.t[-1] <= run.happened[-1][0]
-
-
-@each_method
-def test_algebraic_unknowns_are_solved_or_refused(method: str) -> None:
-    x, z = sf.Variable("x", "1", start=1.0), sf.Variable("z", "1")
-    model = sf.Model("dae", x=(x,), z=(z,), ode=-z.symbol, alg=z.symbol - 2 * x.symbol)
-    if not METHODS[method].dae:
-        with pytest.raises(ValueError, match="got the algebraic unknowns z; use an implicit"):
-            sf.simulate(model, 1.0, method=method)
-        return
-    run = sf.simulate(model, 1.0, rtol=1e-9, method=method)
-    assert run.final["z"] == pytest.approx(2 * np.exp(-2), rel=1e-7)

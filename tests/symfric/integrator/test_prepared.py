@@ -48,8 +48,11 @@ def models(case: str) -> tuple[sf.Model, sf.Model]:
     return CASES[case][0](), CASES[case][0]()
 
 
-@pytest.mark.parametrize("case", CASES)
-@each_backend
+@pytest.mark.parametrize(
+    ("case", "backend"),
+    [*((case, "vm") for case in CASES),
+     *(pytest.param(case, "compiled", marks=needs_compiler) for case in ("events", "loop"))],
+)  # fmt: skip
 def test_a_call_gives_the_bits_of_simulate(case: str, backend: str) -> None:
     """So does a pickled object, and a second call, in any order."""
     (_, fixed, calls), (model, other) = CASES[case], models(case)

@@ -57,18 +57,3 @@ def test_switched_off_option_costs_less_than_in_use_and_than_its_symbol() -> Non
     assert cost(m1).value < cost(sf.BAM()).value < cost(sf.BAM(Q_e=0.01)).value
     assert cost(sf.Coulomb(v_eps=0.0)).value < cost(sf.Coulomb()).value
     assert cost(sf.QuarterCarGeneral(mu=0.0)).value < cost(sf.QuarterCarGeneral()).value - 8
-
-
-def test_arithmetic_of_laws_and_of_what_composes_them() -> None:
-    counts = {
-        "viscous": 1, "coulomb": 4, "self_tuning": 6, "dahl": 8, "stribeck": 10, "lugre": 17,
-        "brown_mcphee": 12, "asymmetric(lugre)": 17, "stribeck+viscous": 12,
-    }  # fmt: skip
-    assert {law: instructions(sf.law_from_text(law)) for law in counts} == counts
-    one = instructions(sf.Asymmetric(sf.LuGre(), sf.LuGre(sigma_0=2e5)))
-    two = instructions(sf.Asymmetric(sf.LuGre(), sf.LuGre(sigma_0=2e5, sigma_1=200.0)))
-    assert two - one == 3, "each parameter that differs costs two products and a sum"
-    full = instructions(sf.LoadDependent(sf.Stribeck(), N_0=2.0, c=0.5))
-    assert full - instructions(sf.LoadDependent(sf.Stribeck())) == 2, (
-        "the smooth maximum is always there"
-    )

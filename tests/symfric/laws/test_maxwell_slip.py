@@ -194,7 +194,6 @@ def test_shares_are_divided_by_their_sum() -> None:
 
 
 SLIDERS = tuple(Slider(0.25 * 1.05 / x, 0.25 * 1.05 * 1.0001) for x in YIELDS)
-PUBLISHED = Leuven(SLIDERS, mu_s=1.05, mu_d=0.2, v_s=98e-6, delta=0.78, sigma_1=0.08)
 LEUVEN_POINTS = [0.0, 1.0e-6, 0.4e-6, 0.8e-6, 0.4e-6, -0.2e-6]
 
 

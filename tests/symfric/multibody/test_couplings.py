@@ -241,9 +241,8 @@ def test_many_random_trains_keep_their_energy() -> None:
     check_trains(range(2, 34))
 
 
-@pytest.mark.parametrize(
-    ("T", "intervals"), [(1.0, 10), pytest.param(3.0, 24, marks=pytest.mark.slow)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("T", "intervals"), [(1.0, 10), (3.0, 24)])
 def test_the_cheapest_lift_moves_as_in_closed_form_and_then_rests(T: float, intervals: int) -> None:
     """Least effort of M = J a + m (g + h a) r tan(lambda + phi): a constant and a straight line.
 

@@ -95,7 +95,7 @@ def random_train(seed: int) -> tuple[Any, Callable[[np.ndarray], np.ndarray]]:
 
 
 @pytest.mark.parametrize(
-    "seed", [0, 1, *(pytest.param(k, marks=pytest.mark.slow) for k in range(2, 10))]
+    "seed", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 10))]
 )
 def test_energy_of_random_trains_closes(seed: int) -> None:
     m, accelerations = random_train(seed)
@@ -116,7 +116,7 @@ def test_energy_of_random_trains_closes(seed: int) -> None:
 def test_inverse_dynamics_needs_what_the_motion_gives() -> None:
     """The torque of the motor in C and in `functions`, for the accelerations of the model."""
     P = Variable("P", "N", start=80.0)
-    for seed in range(3):
+    for seed in range(1):
         m, _ = random_train(seed)
         m.forces = [f for f in m.forces if f.name != "motor"]
         m.forces[-1] = mb.DrumBrake("brake", "c", m.forces[-1].law, P, *SHOE)

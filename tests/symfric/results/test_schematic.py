@@ -79,7 +79,13 @@ def chain(n: int) -> Mechanism:
     return m
 
 
-@pytest.mark.parametrize("name", ALL_SCENES)
+FULL = ("arm", "four_mass", "drill_string", "nip", "quarter_car")
+"""Scenes with many labels; the suite draws these."""
+
+
+@pytest.mark.parametrize(
+    "name", [n if n in FULL else pytest.param(n, marks=pytest.mark.slow) for n in ALL_SCENES]
+)
 def test_schematics_of_all_scenes_are_legible_and_name_what_is_in_them(name: str) -> None:
     machine = ALL_SCENES[name](LAW)
     figure, model = machine.schematic(), machine.model()

@@ -1,5 +1,7 @@
 """Crossings of a run, and the cycle it settles to, against closed forms."""
 
+from pathlib import Path
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -77,6 +79,18 @@ def test_a_bristle_that_vibrates_does_not_define_the_period() -> None:
     run = simulate(rabinowicz(GMS()), 40.0)
     assert run.period().period == pytest.approx(run.period(run.model.expression("v")).period)
     assert run.period().period > 5.0
+
+
+def test_a_section_shows_one_point_per_return(tmp_path: Path) -> None:
+    run = simulate(oscillator(0.1), 20.0, rtol=1e-10)
+    (axis,) = run.plot_section("v", "x", "x", path=tmp_path / "section.png").axes
+    v, x = axis.lines[0].get_data()
+    assert (axis.get_xlabel(), axis.get_ylabel()) == ("v [m/s]", "x [m]")
+    # the velocity falls by exp(-c T / 2) between rising crossings, T = 2 pi / sqrt(9 - c^2 / 4)
+    decay = np.exp(-0.05 * 2 * np.pi / np.sqrt(9 - 0.05**2))
+    assert v[1:] / v[:-1] == pytest.approx(decay, rel=1e-7) and np.abs(x).max() < 1e-12
+    with pytest.raises(ValueError, match="expected an expression that crosses zero"):
+        run.plot_section("v", "x", run.model.expression("x") - 5)
 
 
 def test_runs_without_a_cycle_are_refused() -> None:

@@ -172,14 +172,6 @@ def test_lugre_agrees_with_an_independent_integrator_if_smoothed_below_its_creep
     assert np.abs(run["x"] - expected[0]).max() > 0.1
 
 
-def test_free_parameters_become_symbols_with_unit_and_start() -> None:
-    model = sf.rabinowicz(sf.BrownMcPhee(), free=["mu_s", "k"], k=3.0)
-    assert [(p.name, p.unit, p.start) for p in model.p] == [("mu_s", "1", 0.15), ("k", "N/m", 3.0)]
-    one = sf.simulate(model, 3.0, p={"mu_s": 0.2, "k": 2.1}, rtol=1e-8)
-    other = sf.simulate(sf.rabinowicz(sf.BrownMcPhee(mu_s=0.2)), 3.0, rtol=1e-8)
-    assert one["x"] == pytest.approx(other["x"], abs=1e-6)
-
-
 UNIT = {"m_1": 1.0, "m_2": 1.0, "g": 1.0, "start_2": 0.0}
 
 

@@ -133,7 +133,9 @@ def test_a_box_just_heavy_enough_moves_on(ratio: float, rtol: float) -> None:
     sound(simulate(light_model(ratio, *JOINT), 1.0, rtol=rtol, backend="vm"))
 
 
-@pytest.mark.parametrize("name", MECHANISMS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=slow) if n in ("arm", "four_mass") else n for n in MECHANISMS]
+)
 def test_machines_with_strong_friction_are_far_from_jamming(name: str) -> None:
     """Det(I - dN/dN) at the ends of all steps, by NumPy, equals the product of the pivots."""
     model = MECHANISMS[name](BrownMcPhee(mu_s=0.7, mu_d=0.56, v_t=1e-2)).model()

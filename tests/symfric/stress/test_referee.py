@@ -79,7 +79,15 @@ class Both:
         return [loads[v.name.split("_")[0]][v.name.endswith("_F_e")] for v in self.model.z]
 
 
-@pytest.mark.parametrize(("law", "scene"), PAIRS)
+SOME = ("lugre", "exact_coulomb", "brown_mcphee", "coulomb")
+"""Laws that the suite tries in every scene, the others in one."""
+
+
+@pytest.mark.parametrize(
+    ("law", "scene"),
+    [pytest.param(law, scene, marks=[] if law in SOME or scene == "drive" else pytest.mark.slow)
+     for law, scene in PAIRS],
+)  # fmt: skip
 def test_equations_are_those_of_symfric_to_rounding(law: str, scene: str) -> None:
     rng = np.random.default_rng(7)
     own = {name: SHARED[name] for name in SHARED if hasattr(ALL_LAWS[law](), name)}

@@ -1,7 +1,6 @@
 """Long C functions divided into loops: short, with the bits of CasADi's virtual machine."""
 
 from collections.abc import Callable
-from itertools import product
 
 import casadi as ca
 import numpy as np
@@ -60,10 +59,11 @@ ORDERS = {
 }
 
 
-CASES = [*product([smooth, numbered, changing], ORDERS), (every, "in order")]
-
-
-@pytest.mark.parametrize(("terms", "order"), CASES)
+@pytest.mark.parametrize(
+    ("terms", "order"),
+    [(smooth, "in order"), (smooth, "reversed"), (numbered, "shuffled"), (changing, "reversed"),
+     (every, "in order")],
+)  # fmt: skip
 def test_loops_have_the_bits_of_the_virtual_machine(terms: Terms, order: str) -> None:
     columns = Columns(recursion(terms, ORDERS[order]))
     rng = np.random.default_rng(0)

@@ -17,12 +17,8 @@ from scipy.linalg import expm
 import symfric as sf
 from symfric import Hold, Linear, Model, Output, Variable, simulate
 from symfric.foundation.numeric import Array
-from symfric.integrator.by_peer import peer
 from symfric.integrator.compiled.columns import Columns
 from symfric.integrator.derivatives.functions import FEW, MANY, lanes_source
-from symfric.integrator.equations.inputs import input_data
-from symfric.integrator.equations.system import system
-from symfric.integrator.running.run import Tolerances
 
 LAWS: dict[str, sf.Law] = {"brown_mcphee": sf.BrownMcPhee(), "lugre": sf.LuGre()}
 FREE = ("mu_s", "mu_d", "k")
@@ -138,29 +134,6 @@ def test_derivatives_are_those_of_closed_forms(case: str, backend: str) -> None:
     assert run.gradient(weights) == pytest.approx(summed(run, weights), rel=1e-9)
     first = model.x[0].name
     assert run.gradient({first: 3.0}) == run.gradient({first: [3.0] * 9})
-
-
-@each_law
-def test_casadis_rosenbrock_has_the_same_derivatives(law: str) -> None:
-    model, times = sf.rabinowicz(LAWS[law], free=FREE), np.array([3.0, 6.5])
-    x0 = model.initial_state({"v": 0.02})
-    start = dict(zip([v.name for v in model.x], x0, strict=True))  # all, so that none follows p
-    run = simulate(model, 6.5, x0=start, rtol=1e-12, t_eval=times, sensitivities=FREE)
-
-    inputs = input_data(model, None, 0.0, 6.5)
-    whole = system(model, inputs)
-    tolerances = Tolerances(1e-12, 1e-13 * whole.nominal, 0.0, 1_000_000)
-    problem = peer(whole, inputs, model.values("p"), tolerances, "rosenbrock")
-    solver = ca.integrator("s", problem.plugin, problem.dae, 0.0, times.tolist(), problem.options)
-    p = ca.MX.sym("p", len(model.p))
-    xf = solver(x0=x0 / whole.nominal, p=p)["xf"] * ca.repmat(ca.DM(whole.nominal), 1, times.size)
-    both = ca.Function("both", [p], [xf, ca.jacobian(ca.vec(xf), p)])
-    states, slopes = (found.full() for found in both(model.values("p")))
-    for i, state in enumerate(("x", "v")):
-        assert run[state] == pytest.approx(states[i], rel=1e-6)
-        for j, name in enumerate(FREE):
-            theirs = slopes.reshape(times.size, len(x0), -1)[:, i, j]
-            assert derivative(run, name, state) == pytest.approx(theirs, rel=1e-5)
 
 
 def test_bristle_in_steady_sliding_follows_parameters_and_start_velocity() -> None:

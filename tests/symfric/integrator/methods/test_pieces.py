@@ -114,10 +114,3 @@ def test_calls_have_the_bits_of_the_virtual_machine():
         ends, product = whole(x[:5], x[5:])
         assert (place[2] == ends.full().ravel()).all()
         assert place[3][0] == float(product)
-
-
-def test_a_function_without_calls_is_one_function():
-    x = ca.SX.sym("x", 2)
-    text = routine(ca.Function("f", [x, ca.SX.sym("idle")], [ca.sumsqr(x)]), "f")
-    assert text.count("static void") == 1
-    assert "(void)a1;" in text

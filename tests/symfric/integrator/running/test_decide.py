@@ -75,7 +75,9 @@ MODELS: dict[str, tuple[Any, float, int, list[dict[str, Any]]]] = {
 
 
 @needs_compiler
-@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize(
+    "name", ["hammered", "pendulum", pytest.param("arm", marks=pytest.mark.slow)]
+)
 def test_compiled_code_decides_as_python_does(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     make, t_end, least, cases = MODELS[name]
     model, calls, decided = make(), list[float](), ContactModes.decided
