@@ -2,7 +2,7 @@
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from re import search
@@ -308,7 +308,7 @@ def filled(template: Path, **values: object) -> str:
     return _AtTemplate(template.read_text(encoding="utf-8")).substitute(values)
 
 
-def needed(parts: Mapping[str, str], text: str) -> str:
+def needed(parts: dict[str, str], text: str) -> str:
     """Return the `parts`, by the name that they define, that `text` or a later one of them uses."""
     found = ""
     for name, part in reversed(parts.items()):
