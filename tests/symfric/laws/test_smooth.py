@@ -1,4 +1,4 @@
-"""Smooth approximations: values and two derivatives at zero, and continuity at the knots of laws."""
+"""Smooth approximations: values and two derivatives at zero, and continuity at knots of laws."""
 
 import tomllib
 from collections.abc import Callable
