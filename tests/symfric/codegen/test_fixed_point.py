@@ -76,6 +76,9 @@ FORMULAS = {
     "far_limit": lambda x, y: ca.fmin(x, 1e3) + ca.fmax(y, -1e7),
     "far_tie": lambda x, y: ca.if_else(x < 1e3, y, 2.0 * y),
     "large_log": lambda x, y: ca.log(1e12 * (1.0 + x * x)),
+    "vanishing": lambda x, y: ca.fmax(1e-12 * ca.exp(x) + 9.0 * y, 1e-12 * ca.exp(x) + 4.0),
+    "two_selects": lambda x, y: ca.if_else(x < 0.25, y, 99 * x) + ca.if_else(x < 0.5, y, x),
+    "exact": lambda x, y: x + y - 0.1,
     "small_power": lambda x, y: (1e-4 + x * x) ** -0.01 * y,
 }  # fmt: skip
 """Formulas of x in -1 ... 1 and y in 0 ... 1."""
