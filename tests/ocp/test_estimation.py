@@ -10,16 +10,7 @@ from scipy.linalg import expm
 from scipy.optimize import lsq_linear
 
 from ocp import Estimate, estimate
-from symfric import (
-    BrownMcPhee,
-    Contact,
-    LuGre,
-    Model,
-    Output,
-    SolveError,
-    Variable,
-    simulate,
-)
+from symfric import BrownMcPhee, Contact, LuGre, Model, Output, SolveError, Variable, simulate
 from symfric.integrator import Hold
 
 STEP = 0.05

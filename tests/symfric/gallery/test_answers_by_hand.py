@@ -146,11 +146,6 @@ def test_the_box_of_the_paper_moves_as_far() -> None:
     assert "no explicit method takes this machine" in " ".join(found.lines())
 
 
-def test_other_scenes_are_refused() -> None:
-    with pytest.raises(ValueError, match="expected one of rabinowicz, pendulum_box"):
-        compare_with_paper("drive")
-
-
 def test_every_peaked_law_has_to_peak() -> None:
     assert peaked({"Bengisu": 1.4, "Stick-slip": 1.9, "Coulomb": 1.0})
     for wrong in (1.2, 2.0):
