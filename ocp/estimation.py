@@ -42,7 +42,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 INFORMED = 0.25
 """Ratio of variances with and without measurements below which a combination is observable."""
 CHANCE = 0.01

@@ -58,6 +58,8 @@ def assert_same(one: Ensemble, other: Ensemble) -> None:
         np.testing.assert_array_equal(one[name], other[name])
     np.testing.assert_array_equal(one.attempts, other.attempts)
     np.testing.assert_array_equal(one.reached, other.reached)
+    for name, extremes in one.extremes.items():
+        np.testing.assert_array_equal(extremes, other.extremes[name])
     assert one.failed == other.failed
 
 

@@ -1,7 +1,6 @@
 """Random trains of gears, worms, racks and screws with friction, and their moments by hand."""
 
 from dataclasses import dataclass
-from itertools import product
 from math import cos, pi, tan
 from typing import Any
 
@@ -65,30 +64,6 @@ class Train:
             need = need + self.stages[k].inertia * accelerations[k + 1]
             need = self.stages[k].needs(need, coefficients[k])
         return need + self.inertia * accelerations[0]
-
-    def solvable(self, rates: list[float], level: float) -> bool:
-        """Return True if Coulomb friction allows some acceleration at the given rates.
-
-        The forces between the flanks are tried with all signs. `level` scales the friction.
-        """
-        n = len(self.stages)
-        inertias = np.array([self.inertia, *(stage.inertia for stage in self.stages)])
-        for signs in product((-1.0, 1.0), repeat=n):
-            A, b = np.zeros((n + 1, n + 1)), np.zeros(n + 1)
-            b[0], b[n] = self.motor, self.load
-            A[:, n] = inertias * np.array(rates) / rates[0]
-            for k, (stage, sign) in enumerate(zip(self.stages, signs, strict=True)):
-                f, mu = stage.friction, level * float(stage.friction.law.mu_d)
-                flank = f.flank(stage.ratio, stage.linear)
-                slip = float(flank.lever_a) * rates[k] + float(flank.lever_b) * rates[k + 1]
-                F = mu * np.sign(slip) * sign / float(flank.divisor)  # per unit multiplier
-                A[k, k] = stage.ratio + float(flank.lever_a) * F
-                A[k + 1, k] += float(flank.lever_b) * F - 1.0
-            lam = np.linalg.solve(A, b)[:n]
-            divisors = [float(s.friction.flank(s.ratio, s.linear).divisor) for s in self.stages]
-            if (lam / np.array(divisors) * np.array(signs) > 0).all():
-                return True
-        return False
 
 
 def some_stage(draw: np.random.Generator, last: bool) -> tuple[float, Any, bool]:

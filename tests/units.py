@@ -116,8 +116,8 @@ def over(unit, times, names, inputs=None):
 class Third(Unit):
     """An instance of FMI 3.0 for co-simulation."""
 
-    def __init__(self, archive: Archive) -> None:
-        self.start(archive, "CoSimulation", False, False, False, False, None, c.c_size_t(0), None)
+    def __init__(self, archive: Archive, early: bool = False) -> None:
+        self.start(archive, "CoSimulation", False, False, False, early, None, c.c_size_t(0), None)
 
     def start(self, archive: Archive, kind: str, *between) -> None:
         self.messages = list[str]()

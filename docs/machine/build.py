@@ -197,7 +197,7 @@ def _drawn(function: Callable[[str, Path], None], folder: Path, name: str) -> st
 def keys() -> dict[str, str]:
     """Return the key of each figure: library, shared code, code and text of its paper, size."""
     gallery = ROOT / "symfric" / "gallery"
-    shared = [code_of(p) for p in sorted(gallery.glob("*.py")) if p.name != "pages.py"]
+    shared = [code_of(p) for p in sorted(gallery.glob("*.py"))]
     papers = {
         folder: digest([code_key(), *shared, str(mode("quick")),
                         *(p.read_text("utf-8") for p in sorted((gallery / folder).glob("*.py")))])

@@ -111,10 +111,6 @@ def main(arguments: Sequence[str]) -> int:
     return 0
 
 
-KEYS = ("title", "about", "command", "date", "commit", "machine", "load", "seconds", "tables")
-"""Keys that `docs.machine.measure` writes; "short", a hand-written summary, may be added."""
-SHORT = ("command", "date", "commit", "machine", "tables")
-"""Keys of "short": hand-written tables of a longer measurement."""
 Row = Mapping[str, str]
 """Column title -> cell."""
 

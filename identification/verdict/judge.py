@@ -212,9 +212,10 @@ def _independent(
         least = SMOOTHED * float(np.ptp(channel.measured)) if family.smoothed else fine
         least = max(least, NOISY * channel.motion_noise) if family.noisy else least
         passed = p >= limit or size <= least or (share < SHARE and moved < MOVED)
+        part = f"{100 * min(share, 1.0):.0f} %" if share >= 0.01 else "less than 1 %"
         text = (
             f"The residuals of {name} depend on {family.what}: {size:.2g} {unit} rms, "
-            f"{100 * min(share, 1.0):.0f} % of their variance ({family.hint})."
+            f"{part} of their variance ({family.hint})."
         )
         if passed:
             text = f"The residuals of {name} do not depend on {family.what}."

@@ -227,7 +227,7 @@ def reassemble(
 ) -> Solution:
     """Return a solution of `problem` from the arcs of `solved`.
 
-    Law states, which mode models do not contain, are set to zero.
+    Modes are those of the arcs. Other law states, which mode models do not contain, are zero.
     """
     t, outcome = solved.transcription, solved.outcome
     arcs = list(zip(t.problem.spans, solved.points.spans, t.meshes, strict=True))
@@ -237,7 +237,8 @@ def reassemble(
         legs = [leg for leg in solved.legs if leg.phase == number]
         count = sum(len(leg.arcs) for leg in legs)
         own, arcs = arcs[:count], arcs[count:]
-        spans.append(_span_points(span, own))
+        modes = [arc.modes for leg in legs for arc in leg.arcs]
+        spans.append(_span_points(span, own, modes))
         meshes.append(_mesh(problem, number, legs, [(p.T, mesh) for _, p, mesh in own]))
     points = Values(tuple(spans), solved.points.chosen)
     (motion,) = motions_of(problem, meshes, t.scheme.coefficients(), points)
@@ -258,11 +259,15 @@ def reassemble(
     )
 
 
-def _span_points(span: Span, arcs: Sequence[tuple[Span, SpanPoints, Array]]) -> SpanPoints:
+def _span_points(
+    span: Span,
+    arcs: Sequence[tuple[Span, SpanPoints, Array]],
+    modes: Sequence[Mapping[str, int]],
+) -> SpanPoints:
     """Return the points of one phase of the user's problem.
 
-    Variables that no arc has are zero. States that only some arcs have, the violations of soft
-    conditions at the ends, are constant.
+    Variables that no arc has are zero, except `modes`, those of each arc by contact. States that
+    only some arcs have, the violations of soft conditions at the ends, are constant.
     """
     held = {
         v.name: row[-1] for one, p, _ in arcs for v, row in zip(one.model.x, p.nodes, strict=True)
@@ -275,8 +280,9 @@ def _span_points(span: Span, arcs: Sequence[tuple[Span, SpanPoints, Array]]) -> 
             values: Array = getattr(points, name)[:, int(k > 0 and name == "nodes") :]
             names = [v.name for v in getattr(own.model, letter)]
             rows, count = dict(zip(names, values, strict=True)), values.shape[1]
-            filled = (rows.get(v.name, np.full(count, held.get(v.name, 0.0))) for v in wanted)
-            parts.append(np.array([*filled]).reshape(-1, count))
+            known = held | {n: modes[k].get(c.name, 0) for n, c in span.model.modes.items()}
+            filled = (rows.get(v.name, np.full(count, known.get(v.name, 0.0))) for v in wanted)
+            parts.append(np.array([*filled], float).reshape(-1, count))
         return np.hstack(parts)
 
     groups = (("x", "nodes"), ("x", "inner"), ("z", "z"), ("u", "u"))

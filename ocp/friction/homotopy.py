@@ -77,6 +77,8 @@ PASSES = 4
 """Largest number of meshes at one width."""
 FURTHER = 2
 """Number of repetitions with new starts around straight lines if no start leads to a solution."""
+DEARER = 0.5
+"""Relative excess of the cost at which layers are too wide, as where only friction stops a body."""
 SAME = 3.0
 """Largest ratio between the speeds of the first motion and those assumed for the widths."""
 EARLY: dict[str, Option] = {"tol": 1e-4, "max_iter": 100}
@@ -210,7 +212,9 @@ class _Path:
         before, self.scales = self.scales, self.scales_at(best)
         if not same_size(self.scales, before, SAME):
             again = self.each(coarse, [best.points, *tries])
-            if least(again).good or least(again).ended:
+            dearer = DEARER * abs(best.outcome.cost)
+            wide = least(again)
+            if wide.ended or (wide.good and wide.outcome.cost <= best.outcome.cost + dearer):
                 steps = again
             else:  # the change of the widths is too large
                 self.scales = before

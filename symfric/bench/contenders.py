@@ -158,14 +158,14 @@ def casadi(
     return Contender(solve, seconds)
 
 
-def idas(model: Model, times: Array, watched: Watched, rtol: float, name: str) -> Contender:
-    """Return SUNDIALS' idas, which cannot be compiled: "sundials" for index 1, "ggl" for index 2.
+def idas(model: Model, times: Array, watched: Watched, rtol: float) -> Contender:
+    """Return SUNDIALS' idas on the equations of index 2 (GGL), which cannot be compiled.
 
     Raises:
         RuntimeError: the integrator fails.
     """
     whole, inputs = equations(model, float(times[-1]))
-    problem = peer(whole, inputs, np.zeros(0), tolerances(whole, rtol), name)
+    problem = peer(whole, inputs, np.zeros(0), tolerances(whole, rtol), "ggl")
     y0 = _beginning(model, whole)()
     y0 = np.concatenate([y0, np.zeros(problem.system.n - whole.n)])
     solver, data = problem.over(np.concatenate([[0.0], times]), y0)
@@ -219,13 +219,10 @@ MECHANISMS: dict[str, tuple[str, Callable[..., Contender]]] = {
     "symfric loop": ("joint", loop),
     "symfric absolute": ("absolute", ours),
     "rosenbrock absolute": ("absolute", casadi),
-    "rosenbrock absolute ode": ("absolute", partial(casadi, explicit=True)),
     "rosenbrock joint": ("joint", casadi),
     "rosenbrock joint ode": ("joint", partial(casadi, explicit=True)),
-    "idas GGL absolute": ("absolute", partial(idas, name="ggl")),
-    "idas GGL joint": ("joint", partial(idas, name="ggl")),
-    "idas absolute": ("absolute", partial(idas, name="sundials")),
-    "idas joint": ("joint", partial(idas, name="sundials")),
+    "idas GGL absolute": ("absolute", idas),
+    "idas GGL joint": ("joint", idas),
 }
 """Name -> formulation, and function that returns a contender; "ode": eliminated accelerations."""
 

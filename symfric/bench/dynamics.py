@@ -258,14 +258,12 @@ class OfAuto(NamedTuple):
     """Results of AUTO.
 
     Attributes:
-        hopf: belt speeds of the Hopf points [m/s], the largest first.
         fold: belt speed of the fold of the orbits [m/s]; NaN if it was not found.
         points: number of orbits.
         last: belt speed of the last orbit [m/s].
         seconds: processor time of both runs without compiling [s].
     """
 
-    hopf: Array
     fold: float
     points: int
     last: float
@@ -302,7 +300,7 @@ def belt_of_auto(width: float, points: int, mesh: int = 200) -> OfAuto:
         )  # fmt: skip
     folds = orbits[orbits[:, 2] == FOLD, 4]
     fold = float(folds[0]) if folds.size else np.nan
-    return OfAuto(hopf[:, 4], fold, len(orbits), float(orbits[-1, 4]), first + second)
+    return OfAuto(fold, len(orbits), float(orbits[-1, 4]), first + second)
 
 
 def _run(

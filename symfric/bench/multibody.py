@@ -239,9 +239,9 @@ def chains(
         yield f"Growth exponents of a chain: {', '.join(growth)}"
 
 
-def exponent(rows: Sequence[Row], column: str, smallest: int = 8) -> float:
-    """Return the slope of log(column) over log(links), for at least `smallest` links."""
-    used = [row for row in rows if float(row["links"]) >= smallest]
+def exponent(rows: Sequence[Row], column: str) -> float:
+    """Return the slope of log(column) over log(links), for at least 8 links."""
+    used = [row for row in rows if float(row["links"]) >= 8]
     used = used if len(used) > 1 else rows[-2:]
     links, values = (np.log([float(row[c]) for row in used]) for c in ("links", column))
     return float(np.polyfit(links, values, 1)[0])

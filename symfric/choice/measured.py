@@ -205,7 +205,10 @@ def measured(required: Requirements, name: str, law: Law) -> RankedLaw:
             return replace(row, reason=refusal)
         runs, found = Budget(held, instructions, required.work), SmoothingStudy((), "")
         try:
-            required = _from_own(required, held, runs)
+            if required.reference is OWN:  # a fine run of the law is its reference
+                run = held.run(held.first, 0.1 * required.goal.fine, 10 * runs.most)
+                own = replace(OWN, motion=run.motion, size=run.size)
+                required = replace(required, reference=own)
             found = continuation.continued(runs, required.reference, required.goal)
             placed = _placed(required, held, found, runs, row)
             tried.append((replace(placed, spent=not runs.left()), held, found))
@@ -222,14 +225,6 @@ def measured(required: Requirements, name: str, law: Law) -> RankedLaw:
         core, why = nature.on_core(law) if operations is not None else (nan, row.c_why)
         row = replace(_stepped(required, held, found, row), core=core, core_why=why)
     return _by_data(required.misfits, row)
-
-
-def _from_own(required: Requirements, held: Candidate, runs: Budget) -> Requirements:
-    """Return the requirements, with a fine run of the law as the reference if that is `OWN`."""
-    if required.reference is not OWN:
-        return required
-    run = held.run(held.first, 0.1 * required.goal.fine, 10 * runs.most)
-    return replace(required, reference=replace(OWN, motion=run.motion, size=run.size))
 
 
 def _by_data(misfits: dict[str, float] | None, row: RankedLaw) -> RankedLaw:

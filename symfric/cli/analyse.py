@@ -68,14 +68,12 @@ def analyse(
             branches = [rest]
             for hopf in rest.located("Hopf"):
                 branches.append(orbits_from(rest, hopf, (low, high), points=points, step=longest))
-    if plot:
-        branches[0].plot(own, *branches[1:], path=plot)
+    content = {"scene": scene, "law": law[0], "branches": [b.to_dict() for b in branches]}
+    draw = partial(branches[0].plot, own, *branches[1:])
     if html:
         branches[0].to_html(html, *branches[1:], state=own, command=output.command_line())
-    if save:
-        branches[-1].save(save)
-    content = {"scene": scene, "law": law[0], "branches": [b.to_dict() for b in branches]}
-    output.finish(content, json, partial(_show, branches), plot, html, save)
+    files = (plot, draw), (html, None), (save, branches[-1].save)
+    output.finish(content, json, partial(_show, branches), *files)
 
 
 def _range(text: str) -> tuple[str, float, float]:

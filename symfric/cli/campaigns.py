@@ -79,11 +79,8 @@ def bench(
                 output.note(row)
 
         result = measure(subject, quick, tell, **sizes)
-    if plot:
-        result.plot(plot)
-    if csv:
-        result.write_csv(csv)
-    output.finish(result.to_dict(), json, lambda: show(result.shown()), plot, csv)
+    files = (plot, result.plot), (csv, result.write_csv)
+    output.finish(result.to_dict(), json, lambda: show(result.shown()), *files)
     if result.interrupted:
         raise typer.Exit(INTERRUPTED)
     if result.failed:
@@ -224,7 +221,8 @@ def stress(
 
             report = campaign(cases, seed, workers=workers, limit=limit, progress=progress)
         passed, saved = report.passed, report.save(out)
-        output.finish(report.to_dict(), json, partial(show_report, report), *saved)
+        files = ((path, None) for path in saved)
+        output.finish(report.to_dict(), json, partial(show_report, report), *files)
     if not passed:
         raise typer.Exit(1)
 

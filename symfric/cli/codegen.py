@@ -12,8 +12,7 @@ from symfric import Drive as Nameplate
 from symfric import Law, with_values
 from symfric.cli import options as opt
 from symfric.cli import output
-from symfric.cli.codegen_report import report
-from symfric.cli.codegen_targets import FIXED, REALS, write_controllers, write_fixed
+from symfric.cli.codegen_results import FIXED, REALS, report, write_controllers, write_fixed
 from symfric.cli.machines import OwnMachine, kind_of, settable, with_set
 from symfric.cli.options import Strings
 from symfric.codegen import (

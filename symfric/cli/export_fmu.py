@@ -67,7 +67,7 @@ def export_fmu(
         t_end=t_end,
         name=name,
     )
-    output.finish(to_dict(unit), json, lambda: output.show(str(unit)), unit.path)
+    output.finish(to_dict(unit), json, lambda: output.show(str(unit)), (unit.path, None))
 
 
 def to_dict(unit: Exported) -> dict[str, Any]:

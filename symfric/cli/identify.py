@@ -236,10 +236,6 @@ def identify(
         else:
             fit = Fit(chosen, first, records, **request).solve(**how, throw=False)
     fit, found, failed = judged(fit, other, profiles or ())
-    if html:
-        fit.to_html(html, ranking)
-    if plot:
-        fit.plot(plot)
     content = fit.to_dict()
     if found:
         content["profiles"] = [p.to_dict() for p in found]
@@ -251,7 +247,8 @@ def identify(
         for profile in found:
             output.show(f"\n{profile}")
 
-    output.finish(content, json, show, html, plot)
+    files = (html, partial(fit.to_html, ranking=ranking)), (plot, fit.plot)
+    output.finish(content, json, show, *files)
     refuse(fit, ranking, failed)
 
 
@@ -320,10 +317,6 @@ def identify_robots(
     fit = identify_robot(
         robot, read(logs), *laws.values(), validation=others, method=method, rotors=rotors
     )
-    if plot:
-        fit.plot(plot)
-    if urdf:
-        fit.to_urdf(urdf)
     shown = fit.shown()
 
     def show() -> None:
@@ -332,4 +325,4 @@ def identify_robots(
         for text in shown.after:
             output.show(f"\n{text}")
 
-    output.finish(fit.to_dict(), json, show, plot, urdf)
+    output.finish(fit.to_dict(), json, show, (plot, fit.plot), (urdf, fit.to_urdf))

@@ -56,9 +56,8 @@ def laws(
         load = NORMAL_FORCE if normal_force is None else normal_force
         with output.progress(f"{scenario} of {', '.join(names)}"):
             data = compare(laws_with(names, settings), scenario, load)
-        if plot:
-            data.plot(plot)
-        return output.finish(data.to_dict(), json, partial(show_figure, data), plot)
+        show = partial(show_figure, data)
+        return output.finish(data.to_dict(), json, show, (plot, data.plot))
     texts = opt.assignments("--set", settings)
     if check:
         if not name:
@@ -76,7 +75,8 @@ def laws(
         draw(chosen, 1.0 if normal_force is None else normal_force, plot)
     described = [{"name": text, **to_dict(law)} for text, law in chosen.items()]
     show = partial(show_law, name, chosen[name]) if name else partial(show_list, chosen)
-    return output.finish(described[0] if name else {"laws": described}, json, show, plot)
+    content = described[0] if name else {"laws": described}
+    return output.finish(content, json, show, (plot, None))
 
 
 def laws_with(texts: Sequence[str], settings: Strings) -> list[AnyLaw]:

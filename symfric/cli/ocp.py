@@ -88,17 +88,12 @@ def ocp(
             progress=lambda now: tell(min(1.0, now.iteration / 1000)),
             throw=False,
         )
-    if csv:
-        found.to_csv(csv)
-    if save:
-        found.save(save)
-    if plot:
-        found.plot(path=plot)
     names = (sensitivity or "").split(",") if sensitivity and found.ok else []
     rates = [found.sensitivity(name.strip()) for name in names]
     show = partial(show_solution, problem, found, ready, rates)
     rows = {r.name: {"dJ": r.cost, "dT": r.T, "doubts": list(r.doubts)} for r in rates}
-    output.finish(found.to_dict() | {"sensitivities": rows}, json, show, csv, save, plot)
+    files = (csv, found.to_csv), (save, found.save), (plot, found.plot)
+    output.finish(found.to_dict() | {"sensitivities": rows}, json, show, *files)
     if not found.ok:
         raise SolveError(found.message, found.status, found)
     return None

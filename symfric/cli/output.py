@@ -139,13 +139,23 @@ def finish(
     content: Mapping[str, Any],
     json: str | None,
     show: Callable[[], None],
-    *paths: str | Path | None,
+    *files: tuple[Path | None, Callable[..., object] | None],
 ) -> None:
-    """Write JSON, call `show` unless JSON goes to standard output, and print the file names."""
+    """Write files and JSON, call `show` unless JSON goes to standard output, and print file names.
+
+    Args:
+        content: content of the JSON.
+        json: file of the JSON, or "-" for standard output.
+        show: function that prints the result.
+        files: requested files, each with the function `write(path=...)`; None if it is written.
+    """
+    for path, write in files:
+        if path is not None and write is not None:
+            write(path=path)
     emit_json(content, json)
     if json != "-":
         show()
-    say_written(*paths, json)
+    say_written(*(path for path, _ in files), json)
 
 
 def say_written(*paths: str | Path | None) -> None:

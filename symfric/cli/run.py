@@ -89,8 +89,6 @@ def run(
 
     found = simulated(scene, models, integrate)
     first = found[chosen]
-    if csv:
-        first.to_csv(csv)
     if plot:
         from symfric.results.pictures import plot_trajectories  # noqa: PLC0415  (slow to import)
 
@@ -102,7 +100,8 @@ def run(
             first.animate(movie, progress=tell)
     content = to_dict(chosen, machines[chosen], first) if json else {}
     show = partial(show_runs, found, machines)
-    output.finish(content | {"inputs": given.texts}, json, show, csv, plot, movie)
+    files = (csv, first.to_csv), (plot, None), (movie, None)
+    output.finish(content | {"inputs": given.texts}, json, show, *files)
     refuse_failed(found.values())
 
 

@@ -71,9 +71,8 @@ def scenes(
         )
         plot_trajectories(run, path=plot)
         refuse_failed(run.values())
-    if schematic:
-        machine.schematic(schematic)
-    return output.finish(found, json, partial(show_scene, found), plot, schematic)
+    files = (plot, None), (schematic, machine.schematic)
+    return output.finish(found, json, partial(show_scene, found), *files)
 
 
 def summary(name: str, machine: Scene) -> dict[str, Any]:

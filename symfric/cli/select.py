@@ -106,11 +106,9 @@ def select(
             workers=cpu_count() or 1 if workers is None else workers,
             progress=tell,
         )
-    for path, write in ((csv, found.to_csv), (plot, found.plot), (html, found.to_html)):
-        if path:
-            write(path)
     text = "\n".join([*lines(found), "", fill(LEGEND, 80)])
-    output.finish(found.to_dict(), json, partial(typer.echo, text), plot, html, csv)
+    files = (plot, found.plot), (html, found.to_html), (csv, found.to_csv)
+    output.finish(found.to_dict(), json, partial(typer.echo, text), *files)
     if found.interrupted:
         raise SolveError("select: interrupted", Status.INTERRUPTED, found)
     if found.best is None:

@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from symfric.codegen.blocks.block import SHEET, TEMPLATES, CBlock
-from symfric.emitter.c99 import filled
+from symfric.emitter.c99 import filled, needed
 from symfric.foundation.parameters import Variable
 
 WIDE = 1e6
@@ -134,11 +134,7 @@ def helpers(c: CBlock, text: str) -> str:
     parts["unfit"] = _any(c, "unfit", "a parameter is outside its range", "param", limits)
     limits = [(-state_limit(v), state_limit(v)) for v in c.block.states]
     parts["lost"] = _any(c, "lost", "a state is beyond its limit or not finite", "state", limits)
-    needed = ""
-    for what, body in reversed(parts.items()):
-        if f"{c.name}_{what}(" in text + needed:
-            needed = f"{body}\n\n{needed}"
-    return needed
+    return needed({f"{c.name}_{what}": part for what, part in parts.items()}, text)
 
 
 def _outside(c: CBlock, place: str, low: float, high: float) -> str:

@@ -1,7 +1,7 @@
 """Settings of compensators, of estimators of changing friction, their checks and formulas."""
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any, final
 
@@ -82,16 +82,41 @@ class Compensation:
     counts: float | None = None
 
 
-def pairs_of(where: str, texts: Sequence[str], known: Sequence[str]) -> Iterator[tuple[str, str]]:
-    """Yield name and value of each setting NAME=VALUE,NAME=VALUE; names are `known`, and once."""
-    found = set[str]()
+WORDS, NAMES = ("velocity",), ("without", "free")
+ROWS = {"scales": (1, 1), "build_up_table": (0, 2), "spread": (1, 1), "bounds": (1, 2)}
+"""Settings in texts that are a word, names, and rows A:B: numbers of names and numbers in a row."""
+
+
+def _values(where: str, kind: type, texts: Sequence[str], rows: str) -> dict[str, Any]:
+    """Return the values of settings NAME=VALUE,NAME=VALUE of the dataclass `kind`, every name once.
+
+    Args:
+        rows: description of `ROWS` for messages.
+    """
+    found, known = dict[str, Any](), [item.name for item in fields(kind)]
     for text in (setting for some in texts for setting in re.split(r",(?=\w+=)", some)):
         name, _, value = text.partition("=")
         checks.check_names(where, [name], known)
         if name in found or not value:
             raise checks.refused(where, "NAME=VALUE, every name once", text)
-        found.add(name)
-        yield name, value
+        at, parts = f"{where}: {name}", tuple(value.split(","))
+        if name in WORDS or (name, value) == ("N", "input"):
+            found[name] = value
+        elif name in NAMES or (name == "scales" and ":" not in value):
+            found[name] = parts
+        elif name in ROWS:
+            named, count = ROWS[name]
+            table = [part.split(":") for part in parts]
+            if any(len(row) != named + count for row in table):
+                raise checks.refused(at, rows, value)
+            numbers = [tuple(checks.parsed(at, x) for x in row[named:]) for row in table]
+            single = [row if count > 1 else row[0] for row in numbers]
+            firsts = (row[0] for row in table)
+            found[name] = dict(zip(firsts, single, strict=True)) if named else tuple(single)
+        else:
+            numbers = tuple(checks.parsed(at, part) for part in parts)
+            found[name] = numbers[0] if len(numbers) == 1 else numbers
+    return found
 
 
 def settings_from_text(texts: Sequence[str]) -> Compensation:
@@ -102,27 +127,8 @@ def settings_from_text(texts: Sequence[str]) -> Compensation:
     Raises:
         ValueError: unknown or repeated names, or values that are not numbers.
     """
-    where, found = "compensation", dict[str, Any]()
-    for name, value in pairs_of(where, texts, [item.name for item in fields(Compensation)]):
-        at, parts = f"{where}: {name}", tuple(value.split(","))
-        if name == "velocity" or (name == "N" and value == "input"):
-            found[name] = value
-        elif name == "without" or (name == "scales" and ":" not in value):
-            found[name] = parts
-        elif name in ("scales", "build_up_table"):
-            pairs = [part.partition(":") for part in parts]
-            if not all(second for *_, second in pairs):
-                raise checks.refused(at, "A:B,A:B,...", value)
-            numbers = [checks.parsed(at, second) for *_, second in pairs]
-            if name == "scales":
-                found[name] = dict(zip((first for first, *_ in pairs), numbers, strict=True))
-            else:
-                firsts = (checks.parsed(at, first) for first, *_ in pairs)
-                found[name] = tuple(zip(firsts, numbers, strict=True))
-        else:
-            numbers = tuple(checks.parsed(at, part) for part in parts)
-            found[name] = numbers[0] if len(numbers) == 1 else numbers
-    return chosen_settings(where, None, found)
+    where = "compensation"
+    return chosen_settings(where, None, _values(where, Compensation, texts, "A:B,A:B,..."))
 
 
 def chosen_settings(
@@ -288,20 +294,8 @@ def adaptation_from_text(texts: Sequence[str]) -> Adaptation:
     Raises:
         ValueError: unknown or repeated names, or values that are not numbers.
     """
-    where, found = "adaptation", dict[str, Any]()
-    for name, value in pairs_of(where, texts, [item.name for item in fields(Adaptation)]):
-        parts, at = value.split(","), f"{where}: {name}"
-        if name == "free":
-            found[name] = tuple(parts)
-        elif name in ("spread", "bounds"):
-            rows = [part.split(":") for part in parts]
-            if any(len(row) != (2 if name == "spread" else 3) for row in rows):
-                raise checks.refused(at, "A:1,B:2 or, for bounds, A:LOW:HIGH", value)
-            numbers = {row[0]: tuple(checks.parsed(at, x) for x in row[1:]) for row in rows}
-            found[name] = {n: x[0] if name == "spread" else x for n, x in numbers.items()}
-        else:
-            found[name] = checks.parsed(at, value)
-    return chosen_adaptation(where, None, found)
+    where, rows = "adaptation", "A:1,B:2 or, for bounds, A:LOW:HIGH"
+    return chosen_adaptation(where, None, _values(where, Adaptation, texts, rows))
 
 
 def estimated(

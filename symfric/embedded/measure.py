@@ -1,7 +1,8 @@
 """Cost and accuracy of a step of a block on a Cortex-M core, and unit tests of kits on it."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
+from functools import partial
 from math import inf, nan
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 from symfric.codegen.blocks.block import Block, CBlock
 from symfric.codegen.fixed.generated import FixedPoint
 from symfric.codegen.generated import Generated
-from symfric.codegen.runner import compiled, evaluated, run_c, run_vm
+from symfric.codegen.runner import compiled, run_c, run_vm
 from symfric.codegen.verification import motions
 from symfric.embedded.target import (
     BY,
@@ -23,13 +24,13 @@ from symfric.embedded.target import (
     SHIFT,
     SOURCES,
     Absent,
+    Subject,
     Target,
     Tools,
     by_casadi,
     find_tools,
     literals,
     of_c,
-    own,
 )
 from symfric.emitter.c99 import REALS, filled
 from symfric.foundation import checks
@@ -135,79 +136,64 @@ def measure(
     found = find_tools() if tools is None else tools
     if isinstance(found, Absent):
         return BlockMeasurement(block.name, real, core, by, f"skipped: {found.advice}")
-    further = regimes(block)
-    inputs, columns = np.vstack([day(block, steps), *further.values()]), len(block.states)
-    columns += len(block.outputs)
     c = CBlock(block, REALS[real], guards)
-    with TemporaryDirectory(prefix="symfric-") as name:
-        folder = Path(name)
+
+    def write(folder: Path) -> Subject:
         if by == "symfric":
-            source, parts = own(block, real, folder, guards=guards)
-        else:
-            source, parts = by_casadi(block, real, folder, functions_of_float=by != "casadi")
-        target = Target(CORES[core], found, flags)
-        words, instructions = counted(target, folder, source, parts, real, inputs, columns)
-        results = words["rows"].view(c.real.kind).reshape(-1, columns).astype(float)
-        equal = _equal(c, source, inputs, results)
-    expected = run_vm(CBlock(block, c.real), inputs, results[:, : len(block.states)])
-    return BlockMeasurement(
-        block.name,
-        real,
-        core,
-        by,
-        error=_error(block, results, expected[:, :columns]),
-        equal=equal,
-        finite=bool(np.isfinite(results).all()),
-        **_costs(words, instructions, steps, further),
-    )
+            return of_c(c, folder)
+        return by_casadi(block, real, folder, functions_of_float=by != "casadi")
+
+    further = regimes(block)
+    inputs = np.vstack([day(block, steps), *further.values()])
+    rows, cost = _on_core(c, Target(CORES[core], found, flags), write, inputs, steps, further)
+    expected = run_vm(CBlock(block, c.real), inputs, rows[:, : len(block.states)])
+    error = _error(block, rows, expected[:, : rows.shape[1]])
+    return BlockMeasurement(block.name, real, core, by, error=error, **cost)
 
 
-def measure_fixed(
-    made: FixedPoint,
-    core: str = "m0plus",
-    *,
-    flags: Sequence[str] = ("-O2",),
-    steps: int = STEPS,
-    tools: Tools | Absent | None = None,
-) -> BlockMeasurement:
+def measure_fixed(made: FixedPoint, core: str = "m0plus") -> BlockMeasurement:
     """Measure a step in fixed point, as `measure` does; its error is that of the block.
 
     Inputs are those of `measure`, clamped to their ranges.
     """
     checks.choice("embedded: core", core, CORES)
-    c, found = made.c, find_tools() if tools is None else tools
-    if isinstance(found, Absent):
-        return BlockMeasurement(
-            made.model.name, c.real.name, core, status=f"skipped: {found.advice}"
-        )
-    states, names = ([v.name for v in group] for group in (made.model.states, made.model.inputs))
-    further, ends = regimes(made.model), [*states, *made.model.outputs]
-    low, high = np.array([made.ranges[name] for name in names]).reshape(-1, 2).T
-    inputs = np.clip(np.vstack([day(made.model, steps), *further.values()]), low, high)
+    block, real, tools = made.model, made.c.real.name, find_tools()
+    if isinstance(tools, Absent):
+        return BlockMeasurement(block.name, real, core, status=f"skipped: {tools.advice}")
+    names, ends = [v.name for v in block.inputs], [*(v.name for v in block.states), *block.outputs]
+    further = regimes(block)
+    inputs = made.clamped(names, np.vstack([day(block, STEPS), *further.values()]))
+    target, whole = Target(CORES[core], tools, ("-O2",)), np.rint(inputs * made.scales(names))
+    write = partial(of_c, made.c)
+    rows, cost = _on_core(made.c, target, write, whole, STEPS, further)
+    found = rows / made.scales(ends)
+    error = _error(block, found, made.expected(found, inputs))
+    return BlockMeasurement(block.name, real, core, error=error, **cost)
+
+
+def _on_core(
+    c: CBlock, target: Target, write: Callable[[Path], Subject], inputs: Array, steps: int,
+    further: Iterable[str],
+) -> tuple[Array, dict[str, Any]]:  # fmt: skip
+    """Return the results of every step on a core, and fields of a `BlockMeasurement`.
+
+    Args:
+        write: function that writes the step into a folder.
+        inputs: inputs of `steps` steps, then those of the regimes `further`.
+    """
+    columns = len(c.block.states) + len(c.block.outputs)
     with TemporaryDirectory(prefix="symfric-") as name:
-        source, parts = of_c(c, Path(name))
-        given = Target(CORES[core], found, flags), Path(name), source, parts, c.real.name
-        whole = np.rint(inputs * made.scales(names))
-        words, instructions = counted(*given, whole, len(ends))
-        rows = words["rows"].view(np.int32).reshape(-1, len(ends)).astype(float)
-        equal = _equal(c, source, whole, rows)
-    before = np.vstack([np.zeros(len(states)), rows[:-1, : len(states)] / made.scales(states)])
-    expected = evaluated(made.model.step, before, np.zeros((len(rows), 0)), inputs)
-    return BlockMeasurement(
-        made.model.name, c.real.name, core,
-        error=_error(made.model, rows / made.scales(ends), expected), equal=equal, finite=True,
-        **_costs(words, instructions, steps, further),
-    )  # fmt: skip
-
-
-def _costs(
-    words: Mapping[str, NDArray[np.uint32]], instructions: Array, steps: int, further: Iterable[str]
-) -> dict[str, Any]:
-    """Return instructions and memory for a `BlockMeasurement`."""
-    means = instructions[steps:].reshape(-1, STRETCH).mean(axis=1).tolist()
-    return {
-        "average": float(instructions[:steps].mean()),
-        "maximum": float(round(instructions.max())),
+        folder = Path(name)
+        source, parts = write(folder)
+        words, count = counted(target, folder, source, parts, c.real.name, inputs, columns)
+        rows = words["rows"].view(c.real.kind).reshape(-1, columns).astype(float)
+        equal = _equal(c, source, inputs, rows)
+    means = count[steps:].reshape(-1, STRETCH).mean(axis=1).tolist()
+    return rows, {
+        "equal": equal,
+        "finite": bool(np.isfinite(rows).all()),
+        "average": float(count[:steps].mean()),
+        "maximum": float(round(count.max())),
         "regimes": dict(zip(further, means, strict=True)),
     } | {name: int(words[name][0]) for name in ("text", "library", "data", "stack")}
 

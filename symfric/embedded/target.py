@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from symfric.codegen.blocks.block import Block, CBlock
 from symfric.codegen.source import header, source
-from symfric.emitter.c99 import FUNCTIONS, REALS
+from symfric.emitter.c99 import FUNCTIONS
 from symfric.foundation.files import write_text
 from symfric.foundation.programs import CompileError, Compiler, ProgramError, finished
 
@@ -30,11 +30,6 @@ with a header that replaces these functions by those for float."""
 
 Subject = tuple[Path, dict[str, str]]
 """File with one step of a block, and values of the placeholders of `sources/measured.c`."""
-
-
-def own(block: Block, real: str, folder: Path, *, guards: bool) -> Subject:
-    """Write the C of symfric for a step of `block` into `folder`."""
-    return of_c(CBlock(block, REALS[real], guards), folder)
 
 
 def of_c(c: CBlock, folder: Path) -> Subject:

@@ -145,7 +145,7 @@ class _Rolled:
             for i in range(loop.size)
         }
         self.tables: dict[tuple[float, ...], str] = {}
-        self.calls, self.operations, self.outside = Counter[str](), 0, 0
+        self.calls, self.operations = Counter[str](), 0
 
     def free(self, name: str) -> str:
         """Return an unused name that begins with `name`, and reserve it."""
@@ -171,13 +171,12 @@ class _Rolled:
             for values, name in self.tables.items()
         ]
         lines = (*tables, *lines)
-        return Code(frozenset(self.used), lines, self.calls, self.operations, self.outside)
+        return Code(frozenset(self.used), lines, self.calls, self.operations)
 
     def _counted(self, code: Code, times: int = 1) -> tuple[str, ...]:
         """Return the lines of a part; count its operations, which are executed `times` times."""
         self.calls.update({call: times * count for call, count in code.calls.items()})
         self.operations += times * code.operations
-        self.outside += times * code.outside
         return code.lines
 
     def _split(self, nodes: Sequence[int]) -> list[list[int]]:

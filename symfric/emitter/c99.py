@@ -5,6 +5,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from re import search
 from string import Template
 from textwrap import wrap
 from typing import Any, NamedTuple, final
@@ -305,6 +306,15 @@ class _AtTemplate(Template):
 def filled(template: Path, **values: object) -> str:
     """Return the text of a template file with a value in each placeholder @name."""
     return _AtTemplate(template.read_text(encoding="utf-8")).substitute(values)
+
+
+def needed(parts: dict[str, str], text: str) -> str:
+    """Return the `parts`, by the name that they define, that `text` or a later one of them uses."""
+    found = ""
+    for name, part in reversed(parts.items()):
+        if search(rf"\b{name}\b", text + found):
+            found = f"{part}\n\n{found}"
+    return found
 
 
 def indented(lines: Sequence[str], depth: int = 1) -> str:

@@ -40,14 +40,12 @@ class Code:
         lines: lines of C; statements inside a branch are indented by four blanks.
         calls: function of math.h (name for double) -> number of calls, in all branches.
         operations: number of operations, including calls, in all branches.
-        outside: number of operations outside branches, which are always executed.
     """
 
     used: frozenset[tuple[int, int]]
     lines: tuple[str, ...]
     calls: Counter[str]
     operations: int
-    outside: int
 
 
 def emit(
@@ -92,15 +90,8 @@ def emit(
     write = Writer(better, bools, real)
     body = StatementWriter(better, names, targets, write, loads or {}, stem, truths)
     lines = tuple(body.region(0))
-    places = zip(better.nodes, body.plan.placed.place, strict=True)
-    done = [(node.op, place == 0) for node, place in places if node.op not in LEAVES]
-    return Code(
-        frozenset(body.used),
-        lines,
-        Counter(FUNCTIONS[op] for op, _ in done if op in FUNCTIONS),
-        len(done),
-        sum(outside for _, outside in done),
-    )
+    calls = Counter(FUNCTIONS[node.op] for node in better.nodes if node.op in FUNCTIONS)
+    return Code(frozenset(body.used), lines, calls, better.operations)
 
 
 @final

@@ -114,9 +114,22 @@ def compare(
         able, note = _able(named, lambda law: in_scene(law, scenario))
         return replace(scene_figure(scenario, able), note=note)
     given = scales(first, N)
-    able, note = _able(named, lambda law: FIGURES[scenario](law, N, given))
+    return together(named, lambda law: FIGURES[scenario](law, N, given))
+
+
+def together(laws: Mapping[str, AnyLaw], make: Callable[[AnyLaw], FigureData]) -> FigureData:
+    """Return one figure of `laws`, given by legend entry; its note lists those that `make` rejects.
+
+    The title is that of the first law, completed by the further inputs of all laws.
+
+    Raises:
+        ValueError, SolveError: the error of the first law, if all laws failed.
+    """
+    able, note = _able(laws, make)
     shown = [data.named(name) for name, data in able.items()]
-    title = _title([named[name] for name in able], shown)
+    inputs = [steady_inputs(laws[name]) for name in able]
+    named = [text for text, data in zip(inputs, shown, strict=True) if data.title.endswith(text)]
+    title = shown[0].title.removesuffix(inputs[0]) + "".join(dict.fromkeys(named))
     curves = tuple(curve for one in shown for curve in one.curves)
     notes = "; ".join(text for text in (shown[0].note, note) if text)
     return replace(shown[0], title=title, curves=curves, note=notes)
@@ -152,13 +165,6 @@ def _reason(text: str) -> str:
     """Return the part of an error message that states what was expected."""
     start = text.find("expected ")
     return text[max(start, 0) :].split("; ")[0].split(", got ")[0]
-
-
-def _title(laws: Sequence[AnyLaw], shown: Sequence[FigureData]) -> str:
-    """Return the title of the first figure, completed by the further inputs of all laws."""
-    inputs = [steady_inputs(law) for law in laws]
-    named = [text for text, data in zip(inputs, shown, strict=True) if data.title.endswith(text)]
-    return shown[0].title.removesuffix(inputs[0]) + "".join(dict.fromkeys(named))
 
 
 def _named(laws: Sequence[AnyLaw | str] | Mapping[str, AnyLaw]) -> dict[str, AnyLaw]:

@@ -2,7 +2,7 @@
 
 import textwrap
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import replace
+from contextlib import suppress
 from functools import partial
 from itertools import chain
 from pathlib import Path
@@ -11,6 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from symfric.figures.catalogue import together
 from symfric.figures.data import Array, Curve, FigureData, draw_curves, phenomena
 from symfric.figures.motion import Scales, scales
 from symfric.figures.pushing import stiction
@@ -36,21 +37,16 @@ def natures(laws: Mapping[str, AnyLaw], N: float) -> list[FigureData]:
     scales. A law whose simulation fails is omitted, with the reason in the note of the figure. Laws
     that depend on the velocity alone have no such figure.
     """
-    makers = {label: behaviours(law) for label, law in laws.items()}
-    figures: list[FigureData] = []
-    for name in dict.fromkeys(name for own in makers.values() for name in own):
-        able = {label: law for label, law in laws.items() if name in makers[label]}
+
+    def together_in(name: str) -> FigureData:
+        able = {label: law for label, law in laws.items() if name in behaviours(law)}
         given = scales(next(iter(able.values())), N)
-        shown: list[FigureData] = []
-        failed: list[str] = []
-        for label, law in able.items():
-            try:
-                shown.append(makers[label][name](law, N, given).named(label))
-            except (SolveError, ValueError) as error:
-                failed.append(f"{label} is left out: {error}")
-        if shown:
-            curves = tuple(curve for data in shown for curve in data.curves)
-            figures.append(replace(shown[0], curves=curves, note="; ".join(failed)))
+        return together(able, lambda law: behaviours(law)[name](law, N, given))
+
+    figures: list[FigureData] = []
+    for name in dict.fromkeys(name for law in laws.values() for name in behaviours(law)):
+        with suppress(SolveError, ValueError):
+            figures.append(together_in(name))
     return figures
 
 

@@ -102,7 +102,8 @@ def export_fmu(
     a communication step, which may have any length: while no input jumps, steps pass communication
     points, and the polynomial of the step defines the values there. After a jump of an input or of
     a tunable parameter, the unit repeats the last step up to the point of the jump and solves the
-    algebraic equations again. It locates events of the model and applies their resets.
+    algebraic equations again. It locates events of the model and applies their resets. In FMI 3.0 a
+    communication step ends at an event if the importer allows early returns.
 
     All unknowns may be set before the end of the initialisation. The others follow from them as in
     `simulate(x0=...)`: bristles start in steady sliding, algebraic variables solve their equations.

@@ -62,6 +62,7 @@ def described(
                          "canNotUseMemoryManagementFunctions") if second
                         else ("canGetAndSetFMUState", "canSerializeFMUState"), True),
         fixedInternalStepSize=None if second else own.step,
+        mightReturnEarlyFromDoStep=True if own.model.events and not (second or exchange) else None,
         **{f"providesDirectionalDerivative{'s' * (not second)}": not own.has_loops},
     )  # fmt: skip
     if second:

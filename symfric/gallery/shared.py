@@ -12,7 +12,6 @@ import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import ArrayLike
 
 from symfric import Trajectory
 from symfric.foundation.numeric import Array
@@ -20,12 +19,12 @@ from symfric.foundation.parameters import check_names
 from symfric.foundation.style import QUIET, Line, line
 
 
-def acceleration(run: Trajectory, rate: str, times: ArrayLike | None = None) -> Array:
+def acceleration(run: Trajectory, rate: str) -> Array:
     """Return the derivative of the state `rate`, computed from the equations of the model."""
     model = run.model
     if model.ode is None:
         raise ValueError(f"acceleration: expected explicit equations, got '{model.name}'")
-    return run.of(model.ode[[v.name for v in model.x].index(rate)], times)
+    return run.of(model.ode[[v.name for v in model.x].index(rate)])
 
 
 def rms(difference: Array) -> float:

@@ -19,6 +19,9 @@ from symfric.model.contact import Contact, Variables
 from symfric.model.parts import Event, Holonomic, Monitor, Output
 from symfric.model.sketch import Sketch
 
+SLOW = 1e-6
+"""Sliding velocity, relative to the nominal values of the states, that counts as zero in x0."""
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class System:
@@ -113,6 +116,8 @@ class System:
         if not isfinite(sum(start.tolist())):
             for v, x in zip(self.x, start.tolist(), strict=True):
                 checks.number(f"{self.name}.{v.name}", x)
+        if given and self.modes:
+            self._check_modes(given, start[:, None], self._inputs_at_start[:, None], p[:, None], t)
         return start
 
     def initial_states(
@@ -139,7 +144,39 @@ class System:
         chosen = rows((), {}, [float(v.name in given) for v in self.x])
         inputs, times = rows((), {}, self.values("u")), np.broadcast_to(t, (1, count))
         start = self._start.map(count)(known, chosen, inputs, parameters, times).full()
+        if given and self.modes:
+            self._check_modes(given, start, inputs, parameters, times)
         return start.T, parameters.T
+
+    @cached_property
+    def modes(self) -> dict[str, Contact]:
+        """Contacts by the name of their mode, for laws whose only state is a mode."""
+        return {
+            c.states[0].name: c for c in self.contacts if [s.name for s in c.law.states] == ["mode"]
+        }
+
+    def _check_modes(self, given: Mapping[str, Any], x: Any, u: Any, p: Any, t: Any) -> None:
+        """Refuse a given mode that contradicts the sliding velocity; columns are members.
+
+        Raises:
+            ValueError: a contact sticks while it slides, or slides in the other direction.
+        """
+        names, nominal = [v.name for v in self.x], self.nominal("x")
+        for name in self.modes.keys() & given.keys():
+            slip, z = ca.SX(self.modes[name].slip), np.array([[float(v.start)] for v in self.z])
+            every = [self.vector(letter) for letter in "xzup"]
+            of = ca.Function("slip", [*every, self.t], [slip, ca.jacobian(slip, every[0])])
+            count = x.shape[1]
+            v, slopes = of.map(count)(x, np.tile(z, count), u, p, np.broadcast_to(t, (1, count)))
+            least = SLOW * float(np.abs(slopes.full()[0] * np.tile(nominal, count)).max())
+            modes, speeds = np.round(x[names.index(name)]), v.full()[0]
+            wrong = np.where(modes == 0, np.abs(speeds), -modes * speeds) > least
+            if wrong.any():
+                k = int(wrong.argmax())
+                raise ValueError(
+                    f"{self.name}.{name}: expected 0 in stick, else the direction of sliding, got "
+                    f"{modes[k]:g} at a sliding velocity of {speeds[k]:g}; leave it out of x0"
+                )
 
     def start_slopes(
         self, given: Mapping[str, float] | None = None, p: Mapping[str, float] | None = None,

@@ -151,7 +151,9 @@ def draw(seed: int, number: int) -> Case:
     rng = Draws(seed, number)
     refereed = rng.chance(REFEREED)
     scene = rng.pick(tuple(REFEREED_SCENES) if refereed else SCENES)
-    text, law = _of_the_referee(rng, scene) if refereed else _law(rng, scene)
+    known = [name for name in LAWS if knows(name, scene)]
+    text = rng.pick(known) if refereed else _law(rng, scene)
+    law = law_from_text(text)
     machine = ALL_SCENES[scene](law)
     forms = {name: rng.pick(form.choices) for name, form in options(law).items() if rng.chance(0.3)}
     values = _values(rng, machine)
@@ -181,12 +183,7 @@ def draw(seed: int, number: int) -> Case:
     )
 
 
-def _of_the_referee(rng: Draws, scene: str) -> tuple[str, Law]:
-    name = rng.pick([name for name in LAWS if knows(name, scene)])
-    return name, law_from_text(name)
-
-
-def _law(rng: Draws, scene: str) -> tuple[str, Law]:
+def _law(rng: Draws, scene: str) -> str:
     """Draw a law, one in six in a wrapper or a sum; few need inputs that are not available."""
     name = rng.pick(list(ALL_LAWS))
     while not {i.name for i in ALL_LAWS[name]().inputs} <= OFFERED.get(scene, set()):
@@ -195,9 +192,10 @@ def _law(rng: Draws, scene: str) -> tuple[str, Law]:
         name = rng.pick(list(ALL_LAWS))
     text = rng.pick(WRAPPED).format(name) if rng.chance(1 / 6) else name
     try:
-        return text, law_from_text(text)
+        law_from_text(text)
     except ValueError:  # some wrappers accept only laws without states
-        return name, law_from_text(name)
+        return name
+    return text
 
 
 def _values(rng: Draws, machine: Scene) -> dict[str, float]:

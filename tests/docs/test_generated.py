@@ -112,15 +112,20 @@ def test_publications_are_collected() -> None:
 
 # ---- measurements ----
 
+KEYS = ("title", "about", "command", "date", "commit", "machine", "load", "seconds", "tables")
+"""Keys that `docs.machine.measure` writes; "short", a hand-written summary, may be added."""
+SHORT = ("command", "date", "commit", "machine", "tables")
+"""Keys of "short": hand-written tables of a longer measurement."""
+
 
 def test_stored_measurements_are_complete() -> None:
     stored = measure.stored()
     assert {"integrator", "ivp", "ensemble", "multibody", "ocp", "interop"} <= {*stored}
     for name, found in stored.items():
-        keys = {*measure.KEYS} if "tables" in found else {"title", "about"}
+        keys = {*KEYS} if "tables" in found else {"title", "about"}
         assert {*found} - {"short"} == keys and ("tables" in found or "short" in found), name
-        short = found.get("short", dict.fromkeys(measure.SHORT, "-") | {"tables": []})
-        assert {*short} == {*measure.SHORT} and all(short[k] or k == "tables" for k in short)
+        short = found.get("short", dict.fromkeys(SHORT, "-") | {"tables": []})
+        assert {*short} == {*SHORT} and all(short[k] or k == "tables" for k in short)
         for one in [*found.get("tables", ()), *short["tables"]]:
             assert all({*row} == {*one["rows"][0]} for row in one["rows"]), name
     page = measure.page()
@@ -150,11 +155,11 @@ def test_a_measurement_is_stored_with_machine_load_and_commit(
     monkeypatch.setattr("symfric.bench.measure", lambda subject, quick, progress: result)
     monkeypatch.setattr(measure, "commit", lambda: "abc")
     path = tmp_path / "interop.json"
-    short = dict.fromkeys(measure.SHORT, "-") | {"tables": []}
+    short = dict.fromkeys(SHORT, "-") | {"tables": []}
     path.write_text(json.dumps({"title": "T", "about": "A.", "short": short}), "utf-8")
     assert measure.main(["--quick", "interop"]) == 0
     found = json.loads(path.read_text("utf-8"))
-    assert {*found} == {*measure.KEYS, "short"}
+    assert {*found} == {*KEYS, "short"}
     assert (found["title"], found["about"], found["short"]) == ("T", "A.", short)
     assert found["command"] == "symfric bench interop --quick"
     assert all(float(load) >= 0 for load in found["load"].split(" to "))
@@ -215,7 +220,6 @@ def test_pages_of_an_earlier_build_are_removed(
         ("symfric/gallery/shared.py", lambda name: True),
         ("symfric/gallery/self_tuning/machines.py", lambda name: name.startswith("self_tuning/")),
         ("symfric/gallery/self_tuning/__init__.py", lambda name: name.startswith("self_tuning/")),
-        ("symfric/gallery/pages.py", lambda name: False),
     ],
 )
 def test_a_figure_depends_on_its_paper_and_on_shared_code(

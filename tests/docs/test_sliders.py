@@ -35,7 +35,7 @@ def drawn(law, rng) -> np.ndarray:
 
 
 @needs_browser
-@pytest.mark.parametrize("name", ALL_LAWS)
+@pytest.mark.parametrize("name", sampled(ALL_LAWS, of=2))
 def test_the_force_in_the_browser_is_that_of_python(name, page):
     law, rng = ALL_LAWS[name](), np.random.default_rng(1)
     function = steady(law)

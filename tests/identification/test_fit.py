@@ -175,7 +175,7 @@ print(" ".join(s.hex() for s in fit.noise.values()), fit.evaluations)
 """
 
 
-@pytest.mark.heavy
+@pytest.mark.slow
 def test_processes_side_by_side_agree_to_the_bit(capsys: pytest.CaptureFixture[str]) -> None:
     """Whatever the number of threads of BLAS, which divides sums of more than 10 000 rows only."""
     exec(SCRIPT)

@@ -8,6 +8,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
+from crane import log as crane_log
+from crane import urdf
 from recorders import GERMAN, Frame, lively, pair
 from scipy import io
 
@@ -42,6 +44,7 @@ TABLE = np.column_stack([T, np.sin(T), np.cos(T)])
 RUN = {"t": T, "x": np.sin(T), "force": np.cos(T)}
 FIRST, SECOND = pair(lively(0), 0.1)
 FREE = ("m", "mu_d", "sigma_2")
+AXIS = symfric.Drive(torque_constant=0.12, gear_ratio=2.0, lead=5e-3, counts_per_turn=65536)
 DRIVE = Drive(symfric.Stribeck(mu_s=6.0, mu_d=4.0, v_s=0.1, sigma_2=8.0), m=2.0, N=1.0)
 NAMES: dict[str, Any] = {
     **vars(symfric.laws), **{n: getattr(symfric, n) for n in symfric.__all__},
@@ -59,6 +62,7 @@ NAMES: dict[str, Any] = {
     "Drive": Drive, "Frame": Frame, "GERMAN": GERMAN,
     "NAMES": {"t": "Zeit", "x": "Winkel", "force": "Moment"},
     "TWICE": f"{HEADER}\n0,0,1\n1,1,2\n1,1,2\n2,1,2\n3,4,5\n", "MODEL": DRIVE.model(free=FREE),
+    "AXIS": AXIS, "crane_log": crane_log, "urdf": urdf,
     "Velocity": Velocity, "by_channel": by_channel, "cut": cut, "choose": choose, "plain": plain,
     "subject": subject, "from_data": from_data, "replace": replace, "SX": ca.SX,
 }  # fmt: skip
@@ -104,11 +108,34 @@ def unknowns(what: Any, **given: Any) -> object:
     return unknowns_of(found.unknowns, found.ties, found.names, found.held)
 
 
+def drive_log(columns: dict[str, Any], units: Any = None, **changes: Any) -> Dataset:
+    return Dataset.of({"t [s]": T, **columns}, drive=replace(AXIS, **changes), units=units)
+
+
+def crane(change: Any) -> Dataset:
+    record = crane_log(duration=4.0)[0]
+    changed = {name: change(name, record[name]) for name in record.signals}
+    return crane_log(duration=4.0, **changed)
+
+
 def log(t: Any, x: Any) -> Record:
     return Record("log", t, {"x": x}, {"x": "m"}, first_row=7)
 
 
-OWN = (saved, controller, loop, inverse, curve, shots, motion_of, fit, unknowns, log)
+OWN = (
+    saved,
+    controller,
+    loop,
+    inverse,
+    curve,
+    shots,
+    motion_of,
+    fit,
+    unknowns,
+    log,
+    drive_log,
+    crane,
+)
 
 
 @pytest.fixture

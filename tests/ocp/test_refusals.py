@@ -7,6 +7,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import casadi as ca
+import numpy as np
 import pytest
 from motions import double_integrator, stage
 from phases import on, slider_crank, solve_once, there_and_back, unit_move
@@ -94,20 +95,36 @@ def guessed(guess: Any) -> object:
     return start_of(on(unit_move(), 6), guess)
 
 
+def estimated(data: Any, **more: Any) -> ocp.Estimate:
+    given = {"step": 0.1, "horizon": 3, "noise": {"x": 1.0}} | more
+    return ocp.estimate(MODEL, data, **given)
+
+
 def run_of(t: list[float], **signals: list[float]) -> Any:
     return SimpleNamespace(t=t, signals=signals)
 
 
 def test_bad_input_is_refused(capfd: pytest.CaptureFixture[str]) -> None:
     functions = (
-        *(by_modes, chosen, clash, controller, guessed, implicit, initial_points, make_meshes),
+        *(
+            by_modes,
+            chosen,
+            clash,
+            controller,
+            estimated,
+            guessed,
+            implicit,
+            initial_points,
+            make_meshes,
+        ),
         *(moved, on, positioning, replace, run_of, scenarios, short, solve_once, stage),
         *(there_and_back, two, unit_move, with_stop),
     )
     names = {function.__name__: function for function in functions}
     names |= {"math": math, "FORCE": integral(lambda s: s.force**2), "DRY": DRY, "BACK": BACK}
     names |= {"BAD_END": BAD_END, "MODEL": MODEL, "OPEN": OPEN, "OPENED": OPENED}
-    names |= {"EFFORT": EFFORT, "STARTED": STARTED}
+    row = np.zeros(5)
+    names |= {"EFFORT": EFFORT, "STARTED": STARTED, "ROW": row, "SEEN": {"x": row, "a": row}}
     table = Path(__file__).with_name("refusals.toml")
     assert not_refused(table, symfric, ocp, **names) == []
     capfd.readouterr()  # texts of solvers

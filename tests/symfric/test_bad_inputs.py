@@ -26,7 +26,7 @@ from tables import table
 import ocp
 import symfric as sf
 from identification import Dataset, Fit, InverseDynamics, Shooting, synthetic_drive_data
-from symfric import figures
+from symfric import compensation, figures
 from symfric import multibody as mb
 from symfric.codegen import law_block, plant_block
 from symfric.figures import compare
@@ -219,25 +219,15 @@ test_every_entry_point_refuses_bad_input_in_a_sentence = entry_points_refuse(
 
 
 KINDS: tuple[Callable[[float], Any], ...] = (
-    float,
-    np.float32,
-    np.float64,
-    np.float16,
-    np.array,
-    lambda x: np.array(x, np.float32),
-    ca.DM,
-    ca.SX,
+    *(float, np.float32, np.float64, np.float16, np.array, lambda x: np.array(x, np.float32)),
+    *(ca.DM, ca.SX),
 )
 """All of them hold 0.5 and 2 exactly."""
 PLAIN = KINDS[:-2]
 """Those of Python and NumPy."""
 WHOLE: tuple[Callable[[int], Any], ...] = (int, np.int64, np.uint8, np.int16, float, np.array)
 ROWS: tuple[Callable[[list[float]], Any], ...] = (
-    list,
-    tuple,
-    np.array,
-    lambda x: np.array(x, np.float32),
-    ca.DM,
+    *(list, tuple, np.array, lambda x: np.array(x, np.float32), ca.DM),
 )
 
 
@@ -321,7 +311,7 @@ def test_every_kind_of_number_describes_a_machine() -> None:
 
 def test_every_kind_of_number_is_taken_by_the_tools() -> None:
     model = sf.drive(sf.BrownMcPhee())
-    data = synthetic_drive_data(speeds=(0.01, 0.05))
+    data = synthetic_drive_data(speeds=(0.01, 0.05), rate=250.0)
     t = np.linspace(0.0, 0.05, 60)
     belt = sf.rabinowicz(sf.BrownMcPhee(), free=["mu_d"])
     truth = sf.simulate(belt, 0.05, t_eval=t, x0={"v": 0.5})
@@ -351,3 +341,16 @@ def test_messages_name_the_correct_call() -> None:
     names = {"BELT": sf.rabinowicz(law), "DRIVEN": sf.drive(law), "Rabinowicz": Rabinowicz}
     table = Path(__file__).with_name("stumbles.toml")
     assert not_refused(table, sf=sf, math=math, Mechanism=Mechanism, **names) == []
+
+
+def test_compensation_and_drives_refuse_bad_input() -> None:
+    law, noisy = LuGre(mu_s=6.0, mu_d=4.0), {"mass": 1.0, "noise": 1e-4}
+    plant = sf.drive(law, m=1.0, N=1.0, free=["mu_d"])
+    names = {
+        "BRISTLES": law, "NOISY": noisy, "ROW": np.ones(10), "DRIVEN": sf.drive(LuGre()),
+        "ESTIMATOR": compensation.recursive_estimator(law, **noisy, h=1e-3),
+        "LOOP": (plant, compensation.sine(0.02, 0.5, 0.1), compensation.compensator(law)),
+        "AXIS": sf.Drive(torque_constant=0.12, gear_ratio=-2, lead=5e-3),
+    }  # fmt: skip
+    table = Path(__file__).with_name("refusals.toml")
+    assert not_refused(table, compensation, sf=sf, math=math, **names) == []

@@ -1,11 +1,14 @@
-"""C formulas of integers for the operations of `lowered`."""
+"""C of a step with integers for the operations of `lowered`."""
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from math import ceil
+from re import findall
 from typing import final
 
 import casadi as ca
 
+from symfric.codegen.blocks.block import TEMPLATES, Block
 from symfric.codegen.fixed.operations import (
     ALIGN,
     BITS,
@@ -15,7 +18,18 @@ from symfric.codegen.fixed.operations import (
     SCALE,
     operand_bits,
 )
-from symfric.emitter.c99 import ATOM, FORMS, INTEGER, PRODUCT, SIGN, Expression, Formulas
+from symfric.emitter.c99 import (
+    ATOM,
+    FORMS,
+    INTEGER,
+    PRODUCT,
+    SIGN,
+    Expression,
+    Formulas,
+    filled,
+    needed,
+)
+from symfric.emitter.emit import Code, StatementWriter
 from symfric.emitter.logic import logical
 from symfric.foundation.graph import Graph
 
@@ -30,15 +44,38 @@ LARGEST = 2**31 - 1
 
 @final
 class IntegerWriter(Formulas):
-    """Writer of formulas of integers in the `formats` of their nodes.
+    """Author of the statements of a step, with integers in the `formats` of their nodes.
 
     Attributes:
         prefix: beginning of the names of the functions of `fixed.c`.
+        block: block with real numbers.
+        limits: lowest and highest integer of each state and input by name.
     """
 
-    def __init__(self, source: Graph, formats: Sequence[int], prefix: str) -> None:
+    def __init__(
+        self, source: Graph, formats: Sequence[int], prefix: str, block: Block,
+        limits: Mapping[str, tuple[int, int]],
+    ) -> None:  # fmt: skip
         super().__init__(source, logical(source.nodes), INTEGER)
-        self.formats, self.prefix = formats, prefix
+        self.formats, self.prefix, self.block, self.limits = formats, prefix, block, limits
+
+    def code(self, targets: Sequence[Sequence[str]], loads: Mapping[tuple[int, int], str]) -> Code:
+        """Return the statements; states and inputs are clamped to their ranges."""
+        names = [[v.name for v in group] for group in self.block.groups.values()]
+
+        def clamped(name: str, place: str) -> str:
+            return self.call("clamp", place, *self.limits[name]).text
+
+        given = {(i, j): clamped(names[i][j], place) for (i, j), place in loads.items()}
+        body = StatementWriter(self.source, names, targets, self, given)
+        own = [names[2][j] for i, j in sorted(body.used) if (i, j) not in loads]
+        lines = [*(f"{name} = {clamped(name, name)};" for name in own), *body.region(0)]
+        return Code(frozenset(body.used), tuple(lines), Counter(), 0)
+
+    def helpers(self, text: str) -> str:
+        """Return the functions and tables of `fixed.c` that `text` needs."""
+        whole = filled(TEMPLATES / "fixed.c", name=self.prefix).rstrip().split("\n\n")
+        return needed({findall(r"\nstatic .*?(\w+)[(\[]", part)[0]: part for part in whole}, text)
 
     def formula(self, i: int) -> Expression:
         """Return the formula of a node: a bool, or an integer in its format."""
@@ -90,9 +127,9 @@ class IntegerWriter(Formulas):
             value = max(-LARGEST, min(round(node.value * 2.0**bits), LARGEST))
             return Expression(str(value), ATOM if value >= 0 else SIGN)
         shift = self.formats[i] - bits
-        if shift > BITS:
-            return Expression("0", ATOM)
         value = self.expression(i)
+        if shift > BITS:  # 0, by a function so that the local of the value has a use
+            return self.call("limit", value.text, -shift, 0)
         if shift > 0:
             return self.call("round", value.text, shift)
         return value if shift == 0 else Expression(f"{value.within(ATOM)} * {1 << -shift}", PRODUCT)

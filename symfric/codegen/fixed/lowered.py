@@ -84,8 +84,10 @@ class _Lowered(Nodes):
         return self.add(ca.OP_DIV, a, b)
 
     def select(self, condition: int, yes: int, no: int) -> int:
-        """Return a select, whose sides get its format."""
-        return self.add(SELECT, condition, self.add(ALIGN, yes), self.add(ALIGN, no))
+        """Return a select, whose sides get its format; other selects have sides of their own."""
+        own = float(len(self.nodes))
+        sides = (self.add(ALIGN, side, value=own) for side in (yes, no))
+        return self.add(SELECT, condition, *sides)
 
     def made(self, node: Node, args: Sequence[int]) -> int:
         """Return the number of a node with the value of `node`."""

@@ -31,8 +31,17 @@ static void noted(Memory *m, double *next, const double *dense)
 #if CROSSINGS
     memcpy(m->events_base, m->events, sizeof m->events_base);
     m->stopped = 0;
-    (void)symfric_search(m->row, next, m->R, m->events, m->jump, 0, 0, 0, &m->stopped);
+    m->happened = symfric_search(m->row, next, m->R, m->events, m->jump, 0, 0, 0, &m->stopped)
+                  >= CUT;
 #endif
+}
+
+/* Return 1 once for an event by `end` that has to end the communication step. */
+static int to_report(Memory *m, double end)
+{
+    const int found = m->returns && m->happened && m->S[AT_T] <= end;
+    if (found) m->happened = 0;
+    return found;
 }
 
 /* Make steps up to `end` or beyond; return the reason of an earlier stop, or 0. */
@@ -42,6 +51,7 @@ static int steps_to(Memory *m, double end)
     double most = m->attempts + MOST_ATTEMPTS;
     while (m->S[AT_T] < end) {
         if (m->stopped) return m->stopped;
+        if (to_report(m, end)) return EVENT;
         if (!(m->S[AT_H] >= SMALLEST_STEP && m->S[AT_H] >= STEP_FLOOR * fabs(m->S[AT_T]))) {
             return TINY;
         }
@@ -61,7 +71,8 @@ static int steps_to(Memory *m, double end)
         }
 #endif
     }
-    return m->stopped && m->S[AT_T] <= end ? m->stopped : 0;
+    if (m->stopped && m->S[AT_T] <= end) return m->stopped;
+    return to_report(m, end) ? EVENT : 0;
 }
 
 /* Compute the unknowns at the communication point. */
@@ -85,7 +96,7 @@ static void unknowns(const Memory *m, double *y)
 /* Return to the communication point, with the inputs and parameters used so far. */
 static int returned(Memory *m)
 {
-    m->quiet = 0;
+    m->quiet = m->happened = 0;
     if (!(m->S[AT_T] > m->t)) return 0;
     memcpy(m->S, m->base, sizeof m->S);
     memcpy(m->events, m->events_base, sizeof m->events);

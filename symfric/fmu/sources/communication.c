@@ -47,6 +47,7 @@ static Outcome advance(Instance *unit, double from, double size)
         return DONE;
     }
     m->t = m->S[AT_T];
+    if (why == EVENT) return m->t < end ? EARLY : DONE;
     if (why == TERMINAL) {
         m->phase = ENDED;
         snprintf(unit->said, SAID, "%s: the terminal event %s ended the simulation at t = %.9g s",

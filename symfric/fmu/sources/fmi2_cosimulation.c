@@ -22,6 +22,7 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real size, fmi2Boolean
     if (!allowed(unit, "fmi2DoStep", RUNNING, ENDED)) return fmi2Error;
     switch (advance(unit, time, size)) {
     case DONE:
+    case EARLY: /* not requested */
         return fmi2OK;
     case OVER:
     case REFUSED:

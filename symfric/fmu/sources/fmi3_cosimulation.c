@@ -6,11 +6,14 @@ fmi3Instance fmi3InstantiateCoSimulation(
     size_t n_required, fmi3InstanceEnvironment environment, fmi3LogMessageCallback log,
     fmi3IntermediateUpdateCallback update)
 {
-    return made(name, token, on, environment, log);
+    Instance *unit = unit_of(made(name, token, on, environment, log));
+    if (unit) unit->m.returns = early_return;
+    return unit;
 }
 
 /* Return fmi3Discard for an invalid communication step, which has no effect, and an error if steps
-   fail; a terminal event sets `early` and `terminate`. */
+   fail. A terminal event sets `early` and `terminate`; other events set `early` if the importer
+   allowed it, with the values after the event. */
 fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 time, fmi3Float64 size, fmi3Boolean no_return,
                       fmi3Boolean *event, fmi3Boolean *terminate, fmi3Boolean *early,
                       fmi3Float64 *reached)
@@ -21,10 +24,11 @@ fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 time, fmi3Float64 size, fmi3Bo
     found = advance(unit, time, size);
     *event = fmi3False;
     *terminate = found == OVER;
-    *early = found == OVER;
+    *early = found == OVER || found == EARLY;
     *reached = unit->m.t;
     switch (found) {
     case DONE:
+    case EARLY:
     case OVER:
         return fmi3OK;
     case REFUSED:

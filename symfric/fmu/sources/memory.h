@@ -12,12 +12,13 @@ enum { DATA = FIXED + NX, GIVEN = DATA + ND };
 enum { RECORD = 2 + (2 + ROWS) * N };
 
 /* Reasons to stop; the first three are returned by the search for events. */
-enum { TERMINAL = 4, STORM, FOLLOW, UNSOLVED, TINY, MANY };
+enum { TERMINAL = 4, STORM, FOLLOW, UNSOLVED, TINY, MANY, EVENT };
 
 typedef enum { INSTANTIATED, INITIALISING, RUNNING, ENDED, BROKEN } Phase;
 
-/* Result of a call. OVER: a terminal event occurred; REFUSED: the call had no effect. */
-typedef enum { DONE, OVER, REFUSED, FAILED } Outcome;
+/* Result of a call. EARLY: an event ended the communication step; OVER: a terminal event occurred;
+   REFUSED: the call had no effect. */
+typedef enum { DONE, EARLY, OVER, REFUSED, FAILED } Outcome;
 
 typedef struct {
     unsigned long long kind;          /* token of the model */
@@ -27,6 +28,8 @@ typedef struct {
     int rated;                        /* 1 if `rates` is up to date */
     int quiet;                        /* 1 if nothing jumped at the last communication point */
     int stopped;                      /* reason to stop after the last step, by events */
+    int returns;                      /* 1 if events end communication steps early */
+    int happened;                     /* 1 if the last step ends at an event, not yet reported */
     int limited;                      /* 1 if nothing may be computed beyond `stop` */
     double begin, t, stop;            /* start, communication point, end [s] */
     double attempts;                  /* number of all steps so far */

@@ -24,7 +24,9 @@ static void tolerance(Memory *m, double rtol)
 /* Reset an instance. */
 static void fresh(Memory *m)
 {
+    const int returns = m->returns;
     memset(m, 0, sizeof *m);
+    m->returns = returns;
     m->kind = MODEL_KIND;
     m->stop = HUGE_VAL;
     m->R[AT_H_MAX] = LONGEST_STEP;

@@ -111,13 +111,11 @@ def distance(what: str, t_end: float) -> float:
     return largest(signal("Smooth", what, t_end) - by_hand(t_end)[what])
 
 
-def picture(
-    what: str, label: str, names: tuple[str, ...], t_end: float, limit: float = np.inf
-) -> Figure:
+def picture(what: str, label: str, names: tuple[str, ...], t_end: float) -> Figure:
     """Return a picture with a panel per law, and exact dry friction behind each law."""
     t = run(EXACT, t_end).t
     curves = {name: (t, signal(name, what, t_end)) for name in forms(names)}
-    return small_multiples(curves, (t, signal(EXACT, what, t_end)), label, -limit, limit)
+    return small_multiples(curves, (t, signal(EXACT, what, t_end)), label)
 
 
 def last_swing(name: str, what: str, t_end: float, at: Variant = DRAWN) -> float:

@@ -7,6 +7,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
+from tables import sampled
 
 from identification.data.dataset import Dataset
 from identification.data.synthetic import synthetic_drive_data
@@ -51,7 +52,9 @@ def test_pendulum_of_others(shared_data: Path) -> None:
     silent(data, "irregular", "excitation", "clipping", "delay")
 
 
-@pytest.mark.parametrize("law", ["asymmetric(coulomb+viscous)", "viscous", "makkar_dixon"])
+@pytest.mark.parametrize(
+    "law", sampled(["asymmetric(coulomb+viscous)", "viscous", "makkar_dixon"], of=3)
+)
 def test_laws(law: str) -> None:
     silent(synthetic_drive_data(law_from_text(law), normal_force=20.0, speeds=(0.01, 0.08)))
 

@@ -160,27 +160,6 @@ def test_positions_have_at_least_the_noise_of_their_counts() -> None:
     assert noise_of(read(None, {"x [m]": stroke()}), "x", {}) is None
 
 
-@pytest.mark.parametrize(
-    ("columns", "changes", "message"),
-    [
-        ({"x [m]": T, "torque [N m]": T}, {}, "a log of forces or torques of the load is read wi"),
-        ({"x [m]": T}, {}, r"expected a column of the current \[A\].*columns={'current': '...'}"),
-        ({"x [m]": T, "ActI [A]": T}, {}, "columns={'current': 'ActI'}"),
-        ({"x [m]": T, "current": T}, {}, "column 'current': expected a unit of A, mA, got none"),
-        ({"x [m]": T, "force [N]": T, "current [A]": T}, {}, "none of the force of the load"),
-        ({"counts [counts]": T, "current [A]": T}, {"counts_per_turn": None}, "counts_per_turn or"),
-        ({"current [A]": T}, {"efficiency": 0.9}, "expected a position or a velocity"),
-        ({"angle [rad]": T, "current [A]": T}, {"encoder": "load"}, "lead or drum_radius make"),
-        ({"x [m]": T, "current [A]": T}, {"lead": None}, "expected an angle of the load, got 'm'"),
-    ],
-)
-def test_logs_that_do_not_belong_to_the_drive_are_refused(
-    columns: dict[str, NDArray[np.float64]], changes: dict[str, Any], message: str
-) -> None:
-    with pytest.raises(ValueError, match=message):
-        read(lossless(**changes), columns, units={} if "current" in columns else None)
-
-
 def test_a_current_of_the_wrong_sign_is_reported_and_corrected() -> None:
     data = synthetic_drive_data(seed=1, rate=250.0)[0]
     d = Drive(**SCREW)
@@ -200,10 +179,3 @@ def test_a_missing_counter_is_reported() -> None:
     found = Dataset.of({"t [s]": T, "counts [counts]": counts, "current [A]": T}, drive=d).check()
     assert "the counter wraps after about 409" in str(found)
     assert "set counter of the drive" in str(found)
-
-
-def test_points_and_other_objects_are_refused() -> None:
-    with pytest.raises(ValueError, match="expected records over time, got points=True"):
-        Dataset.of({"v": T, "F": T}, points=True, drive=lossless())
-    with pytest.raises(ValueError, match="read: drive: expected a drive, such as"):
-        Dataset.of({"t": T, "x": T}, drive=3.0)  # type: ignore[arg-type]

@@ -38,13 +38,6 @@ def test_a_rule_below_the_header_is_skipped(tmp_path: Path) -> None:
     assert Dataset.read(file).size == T.size
 
 
-def test_text_among_the_numbers_is_no_header(tmp_path: Path) -> None:
-    """No row is skipped in silence."""
-    file = written(tmp_path / "a.csv", "\n".join([HEADER, *ROWS[:5], "pause,-,-", *ROWS[5:]]))
-    with pytest.raises(ValueError, match="row 7: expected a number, got 'pause'"):
-        Dataset.read(file)
-
-
 def test_large_files_have_the_bits_of_small_ones(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     numbers = np.column_stack([np.arange(30_000), rng.standard_normal((30_000, 2)) * 1e-7])

@@ -72,10 +72,3 @@ def test_the_file_has_the_columns_of_a_log(motion, tmp_path):
     assert np.allclose(record["elbow"], motion.at(record.time)[0][:, 1])
     assert all(name in record and f"{name}_velocity" in record for name in NAMES)
     assert len(motion.plot(tmp_path / "motion.png").axes) == 3
-
-
-def test_bad_requests():
-    with pytest.raises(ValueError, match="excitation: period: expected"):
-        excitation(urdf(), -1.0)
-    with pytest.raises(ValueError, match=r"expected efforts that carry .* ones of elbow"):
-        excitation(urdf().replace('effort="60.0', 'effort="0.1'), 8.0)

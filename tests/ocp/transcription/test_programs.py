@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from discretised import CASES, EFFORT, all_at_once, mean_of_scenarios, mechanism, stage
 from phases import UNIT, on, unit_move
+from tables import sampled
 
 from ocp import solve
 from ocp.formulation.expressions import at_end, integral
@@ -303,7 +304,7 @@ def test_second_mesh_builds_nothing_and_another_number_differentiates_nothing() 
     assert three.program.w.numel() > two.program.w.numel()
 
 
-@pytest.mark.parametrize("make", [all_at_once, mechanism, mean_of_scenarios])
+@pytest.mark.parametrize("make", sampled([all_at_once, mechanism], of=2))
 def test_nonzeros_grow_linearly_and_the_graph_does_not_grow(make: Callable[[], Problem]) -> None:
     made = discretise(make(), Radau(2))
 

@@ -205,22 +205,6 @@ def test_rows_are_printed_as_they_come_and_kept_after_an_interrupt(
     assert len((tmp_path / "t.csv").read_text("utf-8").splitlines()) == 2
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["multibodies"], "expected one of integrator, multibody"),
-        (["ivp", "--links", "2"], "expected no --links"),
-        (["ensemble", "--plot", "x.png"], "bench ensemble: expected no --plot"),
-        (["multibody", "--links", "2,x"], "--links: expected positive whole numbers"),
-    ],
-)
-def test_bad_input_is_described(
-    arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["bench", *arguments]) == 2
-    assert message in capsys.readouterr().err
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("subject", SUBJECTS)
 def test_every_subject_is_measured(subject: str) -> None:

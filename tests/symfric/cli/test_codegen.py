@@ -15,7 +15,7 @@ from identification import Fit, InverseDynamics, synthetic_drive_data
 from identification.result.fitted import Fitted
 from symfric import Coulomb, Sum, Viscous
 from symfric.cli import codegen as command
-from symfric.cli.codegen_report import compared, show_verification
+from symfric.cli.codegen_results import compared, show_verification
 from symfric.codegen import Block, Proof
 from symfric.codegen.verification import Check, Verification
 from symfric.embedded import BlockMeasurement

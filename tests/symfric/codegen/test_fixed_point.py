@@ -76,6 +76,9 @@ FORMULAS = {
     "far_limit": lambda x, y: ca.fmin(x, 1e3) + ca.fmax(y, -1e7),
     "far_tie": lambda x, y: ca.if_else(x < 1e3, y, 2.0 * y),
     "large_log": lambda x, y: ca.log(1e12 * (1.0 + x * x)),
+    "vanishing": lambda x, y: ca.fmax(1e-12 * ca.exp(x) + 9.0 * y, 1e-12 * ca.exp(x) + 4.0),
+    "two_selects": lambda x, y: ca.if_else(x < 0.25, y, 99 * x) + ca.if_else(x < 0.5, y, x),
+    "exact": lambda x, y: x + y - 0.1,
     "small_power": lambda x, y: (1e-4 + x * x) ** -0.01 * y,
 }  # fmt: skip
 """Formulas of x in -1 ... 1 and y in 0 ... 1."""
@@ -92,6 +95,10 @@ def formula(expression, out: Path) -> FixedPoint:
 @pytest.mark.parametrize("name", FORMULAS)
 def test_integers_do_not_overflow(name, compiler, tmp_path):
     agrees(formula(FORMULAS[name], tmp_path), compiler, 3000)
+
+
+def test_states_are_clamped_to_their_ranges(compiler, tmp_path):
+    agrees(fixed_point(AXIS, tmp_path, ON_AXIS | {"z": (-2e-5, 1e-5)}, h=1e-3), compiler, 3000)
 
 
 def test_the_bound_is_close_to_the_largest_error(compiler, tmp_path):

@@ -61,40 +61,6 @@ def test_the_loop_in_the_vm_has_the_bits_of_that_in_c(make, compiler) -> None:
         assert (row == other.estimates[name]).all()
 
 
-@pytest.mark.parametrize(
-    ("make", "law", "chosen", "message"),
-    [
-        (0, BRISTLES, {"noise": 1e-4}, "mass: expected the moving mass"),
-        (0, BRISTLES, {"mass": 1.0}, r"noise: expected the deviation of the velocity.*count /"),
-        (0, BRISTLES, {"mass": -1.0, "noise": 1e-4}, "mass: expected a number > 0"),
-        (0, BRISTLES, {"mass": 1.0, "noise": 1e-4, "free": ["mu_d"]}, "is linear, got mu_d; take"),
-        (1, BRISTLES, {"mass": 1.0, "noise": 1e-4, "free": ["mu"]}, "got mu; did you mean mu_"),
-        (1, BRISTLES, {"mass": 1.0, "noise": 1e-4, "free": []}, "have an effect, got none"),
-        (1, sf.LuGre(), {"mass": 1.0, "noise": 1e-4, "free": ["scale_viscous"]},
-         "have an effect, got scale_viscous without an effect"),
-        (1, BRISTLES, {"mass": 1.0, "noise": 1e-4, "spread": {"offset": 0}}, "spread of 'offset'"),
-        (1, BRISTLES, {"mass": 1.0, "noise": 1e-4, "bounds": {"offset": (1.0, 2.0)}},
-         r"bounds of 'offset': expected \(low, high\) around 0"),
-        (1, BRISTLES, {"mass": 1.0, "noises": 1e-4}, "got noises; did you mean noise"),
-        (0, sf.Karnopp(), {"mass": 1.0, "noise": 1e-4}, "a law of v and N, got one with F_e"),
-    ],
-)  # fmt: skip
-def test_bad_input_is_refused(make, law, chosen, message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        MAKE[make](law, **chosen)
-
-
-def test_close_loop_refuses_estimators_and_values_that_do_not_fit() -> None:
-    plant, reference = sf.drive(BRISTLES, m=1.0, N=1.0, free=["mu_d"]), sine(0.02, 0.5, 0.1)
-    estimator = recursive_estimator(BRISTLES, mass=1.0, noise=COUNTS, free=["inertia"])
-    with pytest.raises(ValueError, match="expected outputs that are parameters of blocks, got ine"):
-        close_loop(plant, reference, COMPENSATOR, estimator=estimator)
-    with pytest.raises(ValueError, match="mu_d: expected a number or 100 values"):
-        close_loop(plant, reference, COMPENSATOR, p={"mu_d": np.ones(99)})
-    with pytest.raises(ValueError, match="p: expected"):
-        close_loop(plant, reference, COMPENSATOR, p={"mu_x": np.ones(100)})
-
-
 @pytest.mark.parametrize("make", MAKE)
 def test_what_a_record_determines_is_said_before_the_estimator_starts(make) -> None:
     """Nothing at rest; a sum at one speed; all in sliding in both directions."""
@@ -134,18 +100,3 @@ def test_the_information_of_a_record_is_the_gramian_of_its_regressors(tmp_path) 
     assert found.condition == pytest.approx(np.linalg.cond(gramian), rel=1e-2)
     found.plot(path=tmp_path / "estimates.png")
     assert (tmp_path / "estimates.png").stat().st_size > 1000
-
-
-def test_follow_refuses_bad_records() -> None:
-    block, one = recursive_estimator(STATIC, mass=1.0, noise=1e-4, h=H), np.ones(10)
-    for arguments, message in (
-        ((COMPENSATOR, one, one), "expected the block of an estimator"),
-        ((block, one, one[:5]), "expected force and v of one length >= 2, got 10 and 5"),
-        ((block, one, np.nan * one), "v: expected finite numbers, got nan at 0"),
-    ):
-        with pytest.raises(ValueError, match=message):
-            follow(*arguments)
-    with pytest.raises(ValueError, match=r"h: expected that of the block, 0\.001 s, got 0\.01"):
-        follow(block, one, one, h=0.01)
-    with pytest.raises(ValueError, match="learn: expected a number or 10 numbers"):
-        follow(block, one, one, learn=one[:5])

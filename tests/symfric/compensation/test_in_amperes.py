@@ -106,18 +106,3 @@ def test_a_loop_in_amperes_equals_that_in_newtons() -> None:
         a, b = in_newtons[name].x, in_amperes[name].x
         assert np.allclose(a, b, atol=2 * Cascade().count)
         assert in_amperes[name].rms == pytest.approx(in_newtons[name].rms, rel=1e-3)
-
-
-def test_wrong_arguments_are_refused() -> None:
-    d = Drive(**SCREW)
-    for given, message in (
-        ({"drive": 3}, "compensator: drive: expected a drive"),
-        ({"counts": 0.0}, "counts: expected a drive with counts_per_turn or resolution, got None"),
-        ({"drive": d, "counts": 0.0}, "counts: expected a drive with counts_per_turn"),
-        ({"drive": d, "turning": True}, "expected a rotary drive for a rotary axis"),
-    ):
-        with pytest.raises(ValueError, match=message):
-            compensator(LAW, h=H, **given)  # type: ignore[arg-type]
-    loop: Any = (drive(LAW), sine(0.01, 1.0, 1.0, h=H), compensator(LAW, h=H, drive=d))
-    with pytest.raises(ValueError, match=r"in the unit of the plant's input \[N\], got A"):
-        close_loop(*loop)

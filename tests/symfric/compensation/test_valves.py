@@ -192,27 +192,3 @@ def test_c_is_the_same_to_the_last_bit(tmp_path: Path) -> None:
     for form in FORMS:
         report = verify(generate(valve_stiction(0.05, 0.02, form=form), tmp_path / form, kit=False))
         assert report.status == "verified", form
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"S": -1.0, "J": 0.0}, r"valve_stiction: S: expected .* got -1"),
-        ({"S": 1.0, "J": float("nan")}, r"valve_stiction: J: expected .* got nan"),
-        (
-            {"S": 1.0, "J": 0.1, "form": "stenman"},
-            "form: expected one of kano, choudhury, he, got stenman",
-        ),
-        ({"S": 1.0, "J": 2.0, "form": "he"}, "expected J <= S for the form he, got J = 2 and"),
-        ({"S": 1.0, "J": 0.1, "name": 3}, "valve_stiction: name: expected a text, got 3"),
-        ({"S": "1", "J": 0.1}, "valve_stiction: S: expected a number"),
-    ],
-)
-def test_bad_input_is_refused(arguments: dict[str, float], message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        valve_stiction(**arguments)  # pyright: ignore[reportArgumentType]
-
-
-def test_bad_amplitudes_are_refused() -> None:
-    with pytest.raises(ValueError, match="amplitudes: expected amplitudes > 0"):
-        valve_describing_function(1.0, 0.5, [1.0, -2.0])

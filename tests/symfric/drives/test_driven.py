@@ -162,22 +162,6 @@ def test_optimal_moves_equal_those_in_load_units() -> None:
     assert found[0] == pytest.approx(found[1], rel=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("given", "message"),
-    [
-        ({"drive": 3}, "driven: drive: expected a drive"),
-        ({"limit": "clip"}, "driven: limit"),
-        ({"input": "forse"}, "did you mean force"),
-        ({"drive": Drive(torque_constant=1.0)}, r"expected a force \[N m\], got 'N'"),
-        ({"free": ("ratio",)}, "did you mean gear_ratio"),
-    ],
-)
-def test_wrong_arguments_are_refused(given: dict[str, Any], message: str) -> None:
-    known: dict[str, Any] = {"drive": Drive(torque_constant=1.0, lead=0.1), **given}
-    with pytest.raises(ValueError, match=message):
-        driven(drive(LuGre()), **known)
-
-
 def test_a_force_without_its_own_coordinate_is_refused() -> None:
     x, v, force = Variable("x", "m"), Variable("v", "m/s"), Variable("force", "N")
     squared = Model("odd", x=(x, v), u=(force,), ode=ca.vertcat(v, force**2))

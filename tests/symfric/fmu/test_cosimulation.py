@@ -106,6 +106,35 @@ def test_a_terminal_event_ends_the_run_and_is_reported(opened):
     assert "terminal event end" in unit.messages[-1][1]
 
 
+class Early(Third):
+    """An instance whose communication steps may end at events."""
+
+    def __init__(self, archive):
+        super().__init__(archive, early=True)
+
+
+@pytest.mark.parametrize("size", [0.01, 0.3, 2.0])
+def test_events_end_communication_steps_early_where_that_is_allowed(opened, size):
+    unit, model = opened(Early, "wire", {"f": 0.3})
+    same = simulate(model, 6.0, rtol=RTOL, u={"f": 0.3})
+    assert len(same.happened) == 2
+    t, found = 0.0, []
+    while t < 6.0:
+        wanted = min(size, 6.0 - t)
+        assert unit.step(t, wanted) == OK, unit.messages
+        event, over, early = (flag.value for flag in unit.flags)
+        assert not (event or over) and early == (unit.reached.value < t + wanted)
+        t = unit.reached.value
+        found += [(t, *unit.get("x", "v"))] * early
+    times = np.array([at for at, _ in same.happened])
+    assert np.abs(np.array(found)[:, 0] - times).max() < 1e-8 and len(found) == times.size
+    assert same.at(times)["x"] == pytest.approx(np.array(found)[:, 1], abs=1e-7)
+    whole, _ = opened(Third, "wire", {"f": 0.3})
+    steps(whole, 6.0)
+    assert whole.reached.value == 6.0 and not whole.flags[2].value
+    assert unit.get("x", "v") == pytest.approx(whole.get("x", "v"), rel=1e-7)
+
+
 def test_start_values_and_tuned_parameters_act_as_in_simulate(opened):
     unit, model = opened(Second, "drive", {"v": 0.3, "mu_s": 0.2})
     same = simulate(model, SPAN, x0={"v": 0.3}, p={"mu_s": 0.2}, t_eval=TIMES, rtol=RTOL)

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from symfric import BrownMcPhee, LuGre, Model, Variable, contact, simulate
-from symfric.foundation.graph import SELECT, graph, rebuild
+from symfric.foundation.graph import graph
 from symfric.foundation.numeric import asinh, atan, column, cos, erf, exp, log, sin, sqrt, tanh
 from symfric.foundation.symbolic import plain, with_symbols
 from symfric.foundation.variable import at_start, stacked, starts_of, strays, symbols_of
@@ -282,19 +282,6 @@ def operations(*expressions: ca.SX) -> list[int]:
     return [node.op for node in source.nodes]
 
 
-def test_if_else_is_one_selection():
-    for condition in (x < y, ca.logic_not(x < y), x):
-        found = operations(*2 * [ca.if_else(condition, ca.sin(x * y), ca.cos(y))])
-        assert (found.count(SELECT), found.count(ca.OP_SIN), found.count(ca.OP_ADD)) == (1, 1, 0)
-
-
-def test_halves_with_different_conditions_stay_a_sum():
-    halves = ca.if_else(x < y, ca.sin(x), 0) + ca.if_else(x < 2 * y, 0, ca.cos(y))
-    found = operations(halves)
-    assert SELECT not in found
-    assert found.count(ca.OP_IF_ELSE_ZERO) == 2
-
-
 def test_what_no_result_needs_is_left_out_and_dependence_follows_the_operations():
     source = graph(ca.Function("f", [x, y], [x + 1]))
     assert [node.op for node in source.nodes] == [ca.OP_INPUT, ca.OP_CONST, ca.OP_ADD]
@@ -303,18 +290,6 @@ def test_what_no_result_needs_is_left_out_and_dependence_follows_the_operations(
     rows = [row[0] for row in source.results]
     for k, expected in enumerate(([True, False, True], [False, True, True])):
         assert [source.depends([k])[i] for i in rows] == expected
-
-
-def test_rebuilding_gives_the_same_function_with_parts_replaced():
-    expression = ca.if_else(x < y, ca.sin(x) ** 3, ca.fmin(x, y)) / (1 + y * y) - ca.sign(x)
-    f = ca.Function("f", [x, y], [expression, x * y, ca.sin(x * y) + 2 * (x * y) + x])
-    source, r = graph(f), ca.SX.sym("r")
-    again = ca.Function("g", [x, y], rebuild(source, [x, y], {}))
-    for at in ((0.3, 0.7), (0.9, -0.7)):
-        assert list(map(float, f(*at))) == list(map(float, again(*at)))
-    *_, replaced = rebuild(source, [x, y], {source.results[1][0]: r})
-    assert not ca.depends_on(replaced, y)
-    assert float(ca.Function("g", [x, r], [replaced])(1.0, 0.0)) == 1.0
 
 
 def test_functions_that_have_no_graph_are_refused():

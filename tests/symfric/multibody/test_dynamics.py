@@ -57,37 +57,6 @@ def test_newton_euler_gives_lagranges_equations(reverse: bool) -> None:
     assert np.linalg.eigvalsh(M).min() > 0
 
 
-@both_ways
-def test_velocities_and_accelerations_are_derivatives_of_positions(reverse: bool) -> None:
-    made = prepared(reverse)
-    kin, a = made.eq.kin, made.eq.a
-
-    def derivative(expression: ca.SX) -> ca.SX:
-        return ca.jtimes(expression, kin.q, kin.qd) + ca.jtimes(expression, kin.qd, a)
-
-    pairs = []
-    for name, m in kin.motion.items():
-        skewed = derivative(ca.densify(m.R)) @ m.R.T
-        pairs += [
-            (derivative(ca.densify(m.p)), m.v),
-            (ca.vertcat(skewed[2, 1], skewed[0, 2], skewed[1, 0]), m.w),
-            (m.R.T @ m.R, ca.SX.eye(3)),
-        ]
-        if name != "ground":
-            pairs += [
-                (derivative(ca.densify(m.v)), m.R @ m.dv_B - kin.motion["ground"].dv_B),
-                (derivative(ca.densify(m.w)), m.R @ m.dw_B),
-            ]
-    q, qd = state(made)
-    values = ca.Function("m", [kin.q, kin.qd, a], [ca.densify(x) for pair in pairs for x in pair])
-    found = [x.full() for x in values.call([q, qd, accelerations(made, q, qd)[0]])]
-    for ours, expected in zip(found[::2], found[1::2], strict=True):
-        assert ours == pytest.approx(expected, abs=1e-12)
-    point, velocity = kin.point("ground.out")
-    assert ca.DM(point).full().ravel() == pytest.approx([0.1, 0.2, 0.3])
-    assert velocity.is_zero()
-
-
 @cache
 def loaded(formulation: str, bearing: mb.JointFriction | None = None) -> PreparedMechanism:
     """The chain with every kind of force, and friction in all joints that have any."""

@@ -1,21 +1,15 @@
-"""Rotations, joints and trees: pose, motion subspace and constraints fit each other."""
+"""Joints and trees: pose, motion subspace and constraints fit each other."""
 
 from typing import ClassVar
 
 import casadi as ca
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 from symfric import multibody as mb
 from symfric.model.sketch import Symbol
 from symfric.multibody.joint import COMPONENTS, Pair, unit
 from symfric.multibody.spatial import (
-    euler_e,
-    euler_g,
-    euler_parameters,
-    rotation,
-    rotation_x,
     rotation_y,
     rotation_z,
     skew,
@@ -143,50 +137,8 @@ def test_a_joint_starts_at_its_given_position_or_without_displacement() -> None:
         assert kind("j", "a", "b", start=start).starts == expected
 
 
-def unit_four(seed: int) -> np.ndarray:
-    p = np.random.default_rng(seed).normal(size=4)
-    return p / np.linalg.norm(p)
-
-
 def full(expression: ca.SX) -> np.ndarray:
     return ca.DM(expression).full()
-
-
-def test_turns_about_an_axis_agree_with_scipy() -> None:
-    for turn, axis in ((rotation_x, "x"), (rotation_y, "y"), (rotation_z, "z")):
-        expected = Rotation.from_euler(axis, 0.7).as_matrix()
-        assert full(turn(ca.SX(0.7))) == pytest.approx(expected)
-    a, b = np.random.default_rng(0).normal(size=(2, 3))
-    assert full(skew(ca.SX(a))) @ b == pytest.approx(np.cross(a, b))
-
-
-def test_euler_parameters_agree_with_scipy_and_come_back() -> None:
-    for p in (*map(unit_four, range(4)), *np.eye(4)[1:]):  # half turns, too
-        R = full(rotation(ca.SX(p)))
-        assert pytest.approx(Rotation.from_quat([*p[1:], p[0]]).as_matrix()) == R
-        back = euler_parameters(ca.DM(R)).full().ravel()
-        assert back * np.sign(back @ p) == pytest.approx(p)
-        assert back[0] >= 0.0
-
-
-def test_identities_of_e_and_g() -> None:
-    p = unit_four(0)
-    E, G, R = (full(f(ca.SX(p))) for f in (euler_e, euler_g, rotation))
-    assert pytest.approx(R) == E @ G.T
-    assert E @ p == pytest.approx(np.zeros(3))
-    assert pytest.approx(np.eye(3)) == E @ E.T
-    assert pytest.approx(np.eye(4) - np.outer(p, p)) == E.T @ E
-
-
-def test_rates_of_euler_parameters_give_both_angular_velocities() -> None:
-    p, pd = ca.SX(unit_four(1)), np.random.default_rng(5).normal(size=4)
-    pd = ca.SX(pd - unit_four(1) * (unit_four(1) @ pd))
-    symbol = ca.SX.sym("p", 4)
-    R_dot = ca.jtimes(ca.vec(rotation(symbol)), symbol, pd)
-    R_dot = full(ca.reshape(ca.substitute(R_dot, symbol, p), 3, 3))
-    R = full(rotation(p))
-    assert full(skew(2 * euler_e(p) @ pd)) @ R == pytest.approx(R_dot)
-    assert R @ full(skew(2 * euler_g(p) @ pd)) == pytest.approx(R_dot)
 
 
 def test_axes_of_a_frame_are_right_handed_and_z_is_kept() -> None:

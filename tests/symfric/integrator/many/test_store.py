@@ -4,12 +4,10 @@ Tasks of an ensemble: plain data, written once, known by every digit, solved by 
 """
 
 import gc
-import pickle
 import signal
 import weakref
 from collections.abc import Callable
 from concurrent.futures import Executor
-from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -25,14 +23,11 @@ import symfric.integrator.many.members as module
 import symfric.integrator.running.integrator as built
 from symfric.foundation.programs import Compiler
 from symfric.integrator.equations.initial import first_guess
-from symfric.integrator.equations.inputs import Input, input_data
+from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.equations.system import system
-from symfric.integrator.many.chunk import Chunk, Job, Solved, digest
+from symfric.integrator.many.chunk import Solved
 from symfric.integrator.many.member_data import Store
-from symfric.integrator.many.members import Assembly, program
-from symfric.integrator.methods.attempt import RRow, SRow
-from symfric.integrator.methods.tableaux import RODAS5P
-from symfric.integrator.running.integrator import Integrator
+from symfric.integrator.many.members import Assembly
 from symfric.scenes import Pendulum
 
 
@@ -47,33 +42,6 @@ def solved(first: int, size: int = 2, fails: bool = True) -> Solved:
 
 def stored(folder: Path | None, members: int = 6) -> Store:
     return Store(folder, ["a", "b"], members, 3, 1)
-
-
-@pytest.mark.parametrize("on_disk", [False, True])
-def test_chunks_are_stored_at_their_members(on_disk: bool, tmp_path: Path) -> None:
-    store = stored(tmp_path if on_disk else None)
-    store.put(2, solved(2))
-    stores = [store, stored(tmp_path)] if on_disk else [store]
-    if on_disk:
-        assert [stores[1].has(first) for first in (0, 2, 4)] == [False, True, False]
-        assert isinstance(store.signals["a"], np.memmap)
-        with pytest.raises(ValueError, match="read-only"):
-            store.signals["a"] *= 2
-    assert store.has(2) is on_disk
-    for one in stores:
-        np.testing.assert_array_equal(one.signals["a"][2:4], [[2.0] * 3, [3.0] * 3])
-        np.testing.assert_array_equal(one.signals["b"][3], [103.0] * 3)
-        assert np.isnan(one.signals["a"][[0, 1, 4]]).all()
-        assert one.attempts.tolist() == [0, 0, 3, 4, 0, 0]
-        assert one.reached[2:4].tolist() == [0.2, 0.3]
-        assert np.isnan(one.reached[[0, 1, 4]]).all()
-        assert one.reach[2:4, :, 0].tolist() == [[-2.0, 2.0], [-3.0, 3.0]]
-        assert one.failed == {3: "member 3 failed at 2³ °C"}
-    store.put(0, solved(0, fails=False))
-    if on_disk:
-        later = stored(tmp_path)
-        assert later.has(0)
-        assert later.failed == {}
 
 
 def test_two_calls_at_once_share_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -258,66 +226,6 @@ def test_disk_space_is_allocated_with_the_files(tmp_path: Path) -> None:
     Store(tmp_path, ["a"], 3000, 100, 1)
     assert (tmp_path / "a.npy").stat().st_blocks * 512 >= 3000 * 100 * 8
     assert np.isnan(np.load(tmp_path / "a.npy")).all()
-
-
-def task(
-    model: sf.Model, start: list[float], u: dict[str, Input] | None = None
-) -> tuple[Job, Chunk]:
-    """Two equal members over a second, results at three times."""
-    inputs = input_data(model, u, 0.0, 1.0)
-    integrator = Integrator(model, inputs, RODAS5P)
-    p, atol = model.values("p"), 1e-7 * integrator.system.nominal
-    S = SRow.at(0.0, 1e-8, start)
-    R = RRow.of(1.0, 1e-6, 1.0, atol, [*p, *inputs.values[:, 0]])
-    times = np.array([0.0, 0.5, 1.0])
-    job = Job(program(integrator), inputs.breaks, times, 10_000)
-    return job, Chunk(np.tile(S, (2, 1)), np.tile(R, (2, 1)), inputs.values[None], np.full(2, 1.0))
-
-
-def test_solving_does_not_change_a_chunk() -> None:
-    u: dict[str, Input] = {"u": sf.Hold([0.0, 0.5], [1.0, -1.0])}
-    for model, start in ((oscillator(), [1.0, 0.0]), (switched(), [1.0, 0.0])):
-        job, chunk = task(model, start, u)
-        S, R = chunk.S.copy(), chunk.R.copy()
-        first, second = job.solve(chunk), job.solve(chunk)
-        np.testing.assert_array_equal(chunk.S, S)
-        np.testing.assert_array_equal(chunk.R, R)
-        np.testing.assert_array_equal(first.signals, second.signals)
-
-
-def test_equal_jobs_have_one_digest_and_every_field_counts() -> None:
-    job, _ = task(switched(), [1.0, 0.0])
-    same, _ = task(switched(), [1.0, 0.0])
-    assert digest(job) == digest(same) == digest(pickle.loads(pickle.dumps(job)))
-    x = ca.SX.sym("x")
-    changes: dict[type, Any] = {
-        str: lambda v: v + " ", bool: lambda v: not v, int: lambda v: v + 1,
-        tuple: lambda v: (*v, "more"), np.ndarray: lambda v: v + 1e-15, type(None): lambda v: 1,
-        ca.Function: lambda v: ca.Function("other", [x], [2 * x]),
-    }  # fmt: skip
-
-    def changed(whole: object) -> list[Any]:
-        """Copies of `whole`, each with one field changed at any depth."""
-        if not is_dataclass(whole):
-            return [None]
-        found = []
-        for item in fields(whole):
-            value = getattr(whole, item.name)
-            new = changes.get(type(value), changed)(value)
-            found += [
-                replace(whole, **{item.name: n}) for n in (new if type(new) is list else [new])
-            ]
-        return found
-
-    every = changed(job)
-    assert len(every) > 12
-    assert len({digest(one) for one in every} - {digest(job)}) == len(every)
-    zeros, tiny = np.zeros(5000), np.zeros(5000)
-    tiny[2500] = 1e-300
-    assert repr(zeros) == repr(tiny)
-    assert digest(zeros) != digest(tiny)
-    assert digest(zeros) != digest(zeros.reshape(50, 100))
-    assert digest("ab", "c") != digest("a", "bc")
 
 
 @pytest.mark.parametrize("make", [oscillator, switched])

@@ -2,23 +2,19 @@
 
 import ctypes
 from collections.abc import Callable
-from functools import cache
+from typing import Any
 
 import casadi as ca
 import numpy as np
 import pytest
+from backends import needs_compiler
 from differentiable import oscillator
 from ensembles import explosive
 
-from symfric import LuGre, Model, rabinowicz
+from symfric import Ensemble, LuGre, Model, rabinowicz, simulate_many
 from symfric.integrator.compiled.compiler import load
-from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.many import vectors
-from symfric.integrator.many.members import CompiledMembers, Stretch, many_source
 from symfric.integrator.many.vectors import lanes_header, vector_source
-from symfric.integrator.methods.attempt import RRow, SRow
-from symfric.integrator.methods.tableaux import RODAS5P
-from symfric.integrator.running.integrator import Integrator
 
 LOOP = """
 void apply(const double *x, const double *y, double *out, long long n)
@@ -148,78 +144,39 @@ def test_an_operation_that_c_lacks_is_refused() -> None:
         vector_source("f", together(lambda x, y: ca.erfinv(x)))
 
 
-def each_lanes(lanes: list[int]) -> pytest.MarkDecorator:
-    slow = [pytest.param(n, marks=pytest.mark.slow) for n in lanes[1:]]
-    return pytest.mark.parametrize("lanes", [lanes[0], *slow])
-
-
-@each_lanes([2, 1, 4, 8])
+@pytest.mark.parametrize(
+    "lanes", [2, *(pytest.param(n, marks=pytest.mark.slow) for n in (1, 4, 8))]
+)
 def test_bits_of_functions_do_not_depend_on_the_number_of_lanes(lanes: int) -> None:
     x, y = numbers()
     np.testing.assert_array_equal(applied(FUNCTIONS, x, y, lanes), applied(FUNCTIONS, x, y))
 
 
-@cache
-def made(model: Callable[[], Model], end: float, lanes: int) -> tuple:
-    """Return a model, its inputs and the runner of its members."""
-    whole = model()
-    inputs = input_data(whole, None, 0.0, end)
-    integrator = Integrator(whole, inputs, RODAS5P)
-    source = many_source(integrator.step, integrator.signals, lanes=lanes)
-    return whole, inputs, CompiledMembers.of(source, integrator.signals.numel_out(0))
+ENDS = np.array([3.0, 1e-4, 0.5, 3.0, 1.0, 2.0, 0.35])
+MEMBERS = (
+    (explosive(), "p", "p", np.array([0.1, 2.0, 0.5, 7.0, 0.0, 0.4, 1e9])),
+    (oscillator(), "p", "k", np.array([1.0, 4.0, 1e10, 2.0, 3.0, 5.0, 1.0])),
+    (rabinowicz(LuGre()), "x0", "v", np.linspace(-0.1, 0.1, 7)),
+)
+"""Runs of 1e-4 to 3 s, one that explodes, one that needs too many steps."""
 
 
-def run(
-    make: Callable[[], Model], starts: np.ndarray, p: np.ndarray, ends: np.ndarray, lanes: int
-) -> tuple:
-    """Return all results of members over [0, ends]."""
-    model, inputs, members = made(make, 3.0, lanes)
-    S = SRow.at(0.0, 1e-8, starts)
-    d = np.hstack([p, np.tile(inputs.values[:, 0], (starts.shape[0], 1))])
-    R = RRow.of(0.0, 1e-6, np.inf, 1e-7 * model.nominal("x"), d)
-    attempts, h_min = np.zeros(starts.shape[0], dtype=np.int64), np.full(starts.shape[0], 1e-23)
-    times = np.array([[0.0, 0.1, 0.35, 1.0, 3.0]])
-    found, reason, reach = members.run(
-        S, R, attempts, Stretch(inputs.breaks, inputs.values[None], ends, h_min, times, 3000)
-    )
-    return found, reason, reach, S, attempts
+def picked(model: Model, group: str, name: str, values: np.ndarray, pick: list[int]) -> Ensemble:
+    """Members by their number; that of each seventh is the same again."""
+    which = np.array(pick) % 7
+    given: dict[str, Any] = {group: {name: values[which]}, "t_eval": [0.0, 0.1, 0.35, 1.0, 3.0]}
+    return simulate_many(model, ENDS[which], max_steps=3000, backend="compiled", **given)
 
 
-def mixed(lanes: int = 0, pick: slice = slice(None)) -> list[tuple]:
-    """Runs of 1e-4 to 3 s, one that explodes, one of NaN, one that needs too many steps."""
-    ends = np.array([3.0, 1e-4, 0.5, 3.0, 1.0, 2.0, 0.35])
-    belt = np.array([[0.0, v, 0.0] for v in np.linspace(-0.1, 0.1, 7)])
-    stiff = np.array([1.0, 4.0, 1e10, 2.0, np.nan, 5.0, 1.0])
-    burst = np.array([0.1, 2.0, 0.5, np.nan, 0.0, 0.4, 1e9])
-    none, swing = np.zeros((7, 0)), np.tile([1.0, 0.0], (7, 1))
-    damped = np.stack([stiff, 0 * stiff], 1)
-    found = [
-        run(explosive, np.ones((7, 1))[pick], burst[pick, None], ends[pick], lanes),
-        run(oscillator, swing[pick], damped[pick], ends[pick], lanes),
-    ]
-    if lanes != 2:  # which is the fast one
-        found.append(run(stuck, belt[pick], none[pick], ends[pick], lanes))
-    return found
-
-
-def stuck() -> Model:
-    return rabinowicz(LuGre())
-
-
-@each_lanes([2, 1, 4, 8])
-def test_a_member_does_not_depend_on_lanes_and_neighbours(lanes: int) -> None:
-    whole = mixed()
-    for one, other in zip(whole, mixed(lanes), strict=False):
-        for a, b in zip(one, other, strict=True):
-            np.testing.assert_array_equal(a, b)
-    for m in (0, 1, 4):
-        for one, alone in zip(whole, mixed(pick=slice(m, m + 1)), strict=True):
-            for a, b in zip(one, alone, strict=True):
-                np.testing.assert_array_equal(a[m], b[0])
-    burst, swing, (found, reason, _, S, attempts) = whole
-    assert reason.tolist() == [0] * 7
-    assert S[:, SRow.T].tolist() == [3.0, 1e-4, 0.5, 3.0, 1.0, 2.0, 0.35]
-    assert np.isfinite(found[:, :, 0]).sum(axis=1).tolist() == [5, 1, 3, 5, 4, 4, 3]
-    assert attempts[1] < attempts[0] / 5
-    assert swing[1].tolist() == [0, 0, 2, 0, 3, 0, 0]
-    assert burst[1].tolist() == [0, 0, 0, 3, 0, 0, 3]
+@needs_compiler
+def test_a_member_does_not_depend_on_its_neighbours() -> None:
+    for model, *given in MEMBERS:
+        whole = picked(model, *given, [*range(35)])  # more than lanes: some take several members
+        for m in (0, 1, 25, 34):
+            few = picked(model, *given, [3, m])
+            for signal in model.signals:
+                np.testing.assert_array_equal(whole[signal][m], few[signal][1])
+            assert whole.attempts[m] == few.attempts[1]
+    assert not whole.failed
+    assert np.isfinite(whole["x"]).sum(axis=1).tolist() == [5, 1, 3, 5, 4, 4, 3] * 5
+    assert whole.attempts[1] < whole.attempts[0] / 5

@@ -24,11 +24,9 @@ from symfric.foundation.numeric import Array
 from symfric.integrator.equations.system import System
 from symfric.integrator.methods.attempt import (
     GROW,
-    REACH,
     SHRINK,
     RRow,
     SRow,
-    Watch,
     build_fixed,
     build_step,
     instructions,
@@ -286,28 +284,6 @@ LAWS["brown_mcphee"] = sf.BrownMcPhee(mu_s=0.3, mu_d=0.0, v_t=1e-4)
 def law(case: str) -> sf.Law:
     name, *more = case.split()
     return sf.Sum((LAWS[name], sf.Viscous(sigma_2=0.02))) if more else LAWS[name]
-
-
-def test_an_error_of_slip_is_measured_by_the_slower_end_of_a_step() -> None:
-    """e / (rtol (w + min|s|)): here 1e-6 / (1e-3 (0.5 + 2))."""
-    y, e = ca.SX.sym("y"), ca.SX.sym("e")
-    same = ca.Function("change", [y, e, ca.SX.sym("d", 0)], [e])
-    for before, after in ((-2.0, 10.0), (10.0, 2.0)):
-        slip = Watch(*(ca.DM([x]) for x in (before, 0.0, after, 0.5)), same, 1)
-        assert float(slip.error(0.0, 1e-6, [], 1e-3)) == pytest.approx((1e-6 / 2.5e-3) ** 2)
-
-
-def test_travel_is_counted_in_what_is_allowed_at_its_nearest_point() -> None:
-    for before, half, after, travel, nearest in (
-        (10.0, 6.0, 2.0, 8.0, 2.0),  # straight, towards rest
-        (-2.0, -6.0, -10.0, 8.0, 2.0),
-        (3.0, 0.0, -3.0, 6.0, 0.0),  # through rest
-        (5.0, 1.0, 5.0, 4.0, 1.0),  # a dip and back: ends alone would show nothing
-        (5.0, -1.0, 5.0, 6.0, 0.0),  # a dip through rest
-    ):
-        change = ca.Function("change", [ca.SX.sym("y")], [ca.SX(0)])
-        watch = Watch(*(ca.DM([x]) for x in (before, half, after, 1.0)), change, 1)
-        assert float(watch.leap()) == travel / (REACH * (1 + nearest))
 
 
 def test_friction_peaks_without_a_coulomb_level_catch_the_block() -> None:

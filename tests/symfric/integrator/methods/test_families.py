@@ -18,13 +18,11 @@ from symfric.foundation.numeric import NEAR, exp_phi1_phi2
 from symfric.integrator.equations.initial import consistent, first_guess
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.methods.attempt import (
-    KAPPA,
     RRow,
     SRow,
     build_dense_step,
     build_fixed,
     build_step,
-    converged,
 )
 from symfric.integrator.methods.families import eliminated, need_ode
 from symfric.integrator.methods.method import combination
@@ -32,7 +30,6 @@ from symfric.integrator.methods.tableaux import (
     BACKWARD_EULER,
     DOPRI5,
     EXPONENTIAL,
-    METHODS,
     RADAU5,
     RODAS5P,
 )
@@ -122,14 +119,6 @@ def test_bristles_stay_within_their_travel_at_any_step() -> None:
         assert np.sign(z) == np.sign(v - 0.1)
 
 
-def test_work_of_a_step_is_its_stages_and_factorisations() -> None:
-    system = assemble(sf.rabinowicz(sf.LuGre()))
-    for name, stages in {"rodas5p": 8, "rodas4p": 6, "rodas3": 4}.items():
-        assert METHODS[name].work(system) == (stages, 1, 1)
-    assert RADAU5.work(assemble(smooth_ode().model)) == (7, 1, 2)
-    assert RADAU5.work(assemble(smooth_dae().model)) == (10, 1, 2)
-
-
 @pytest.mark.parametrize(
     ("law", "attempt", "step", "divisions"),
     [(sf.BrownMcPhee(), 1002, 451, 46), (sf.LuGre(), 1273, 645, 49)],
@@ -148,18 +137,6 @@ def test_attempt_costs_no_more_instructions_than_it_did(
     assert len(operations) <= attempt
     assert operations.count(ca.OP_DIV) <= divisions
     assert build_fixed(system, RODAS5P).n_instructions() <= step
-
-
-def test_newton_is_done_when_what_is_to_come_is_small() -> None:
-    cases = [
-        (1.0, 0.9 * KAPPA, True),  # small
-        (0.8, 0.2, True),  # a quarter each: a third of the last one is still to come
-        (0.3, 0.27, False),  # too slow
-        (0.1, 0.2, False),  # diverges
-        (0.0, 0.0, True),
-    ]
-    for before, last, enough in cases:
-        assert bool(converged(ca.DM(before**2), ca.DM(last**2))) == enough
 
 
 @pytest.mark.parametrize("kind", [ca.SX, ca.MX], ids=["flat", "blocks"])

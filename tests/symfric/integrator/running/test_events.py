@@ -378,3 +378,16 @@ def test_an_interrupted_step_skips_no_sample(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.undo()
     assert plant.step() == pytest.approx(np.array([[0.75, -1.0]] * 2))
     assert plant.t.tolist() == [0.5, 0.5]
+
+
+def test_start_modes_that_contradict_the_sliding_velocity_are_refused() -> None:
+    sled = sf.drive(sf.ExactCoulomb(mu_s=0.9, mu_d=0.1))
+    free = simulate(sled, 0.5, x0={"v": 1.0})
+    for v, mode in ((1.0, 0.0), (-1.0, 1.0), (1e-4, -1.0)):
+        with pytest.raises(ValueError, match="mode: expected 0 in stick, else the direction"):
+            simulate(sled, 0.5, x0={"v": v, "mode": mode})
+    with pytest.raises(ValueError, match="got 1 at a sliding velocity of -2"):
+        sf.simulate_many(sled, 0.5, x0={"v": [1.0, -2.0], "mode": 1.0})
+    assert simulate(sled, 0.5, x0={"v": 1.0, "mode": 1.0}).final == free.final
+    again = {v.name: free.final[v.name] for v in sled.x}
+    assert simulate(sled, 2.0, x0=again).final["mode"] == 0.0

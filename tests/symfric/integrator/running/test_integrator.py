@@ -6,9 +6,8 @@ Dense output, values at the times of the result, and the steps that a run keeps.
 import copy
 import gc
 import weakref
-from collections.abc import Callable, Hashable
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 from typing import Any
 
 import casadi as ca
@@ -25,19 +24,9 @@ from symfric.integrator.compiled.columns import Columns
 from symfric.integrator.equations.initial import consistent
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.methods.tableaux import METHODS
-from symfric.integrator.running.crossings import cutting
-from symfric.integrator.running.integrator import REMEMBERED, Integrator, built, remember
-from symfric.integrator.running.record import Dense, Record, RunRecord, hermite
+from symfric.integrator.running.integrator import REMEMBERED, Integrator, built
+from symfric.integrator.running.record import RunRecord, hermite
 from symfric.scenes import PendulumBox, SliderCrank
-
-
-def test_the_first_remembered_stays_and_the_oldest_goes() -> None:
-    known: dict[Hashable, str] = {}
-    for key, new, kept in ((1, "a", "a"), (1, "b", "a"), (2, "c", "c"), (2, "d", "c")):
-        assert remember(known, key, new, 2) == kept
-    assert known == {1: "a", 2: "c"}
-    assert remember(known, 3, "e", 2) == "e"
-    assert known == {2: "c", 3: "e"}
 
 
 @pytest.fixture
@@ -163,15 +152,6 @@ def test_a_copy_of_a_model_remembers_nothing() -> None:
     assert simulate(copy.copy(model), 0.1, backend="vm").final == simulate(model, 0.1).final
 
 
-RNG = np.random.default_rng(7)
-
-
-def pieces(rows: int, count: int = 3, n: int = 2) -> Dense:
-    """A continuous chain with random coefficients on [0, count] s."""
-    t, y = np.arange(count + 1.0), RNG.normal(size=(count + 1, n))
-    return Dense(t[:-1], t[1:], y[:-1], y[1:], RNG.normal(size=(count, rows, n)))
-
-
 def cubic(t: Array) -> Array:
     return np.stack([1 + t - 2 * t**2 + t**3, 4 - t**3])
 
@@ -184,38 +164,6 @@ def test_hermite_interpolation_reproduces_cubics() -> None:
     t = np.array([0.0, 0.3, 1.0, 1.1, 2.5])
     fine = np.linspace(0, 2.5, 77)
     assert hermite(t, cubic(t), cubic_slope(t))(fine) == pytest.approx(cubic(fine), abs=1e-13)
-
-
-@pytest.mark.parametrize(("rows", "degree"), [(0, 1), (1, 2), (2, 3), (3, 4)])
-def test_piece_is_a_polynomial_one_degree_above_its_rows(rows: int, degree: int) -> None:
-    """Through the accepted values at its ends; a step cut at an event keeps it."""
-    dense, every = pieces(rows), np.arange(3)
-    np.testing.assert_array_equal(dense.piece(every, np.zeros(3)), dense.y0)
-    np.testing.assert_array_equal(dense.piece(every, np.ones(3)), dense.y1)
-    ends = np.vstack([dense.y0, dense.y1[-1:]])
-    assert pytest.approx(ends, abs=1e-14) == dense(np.arange(4.0)).T
-    s = np.linspace(0, 1, 9)
-    values = dense.piece(np.zeros(9, int), s)
-    for power in (degree, degree - 1):
-        fitted = np.polynomial.polynomial.polyfit(s, values, power)
-        off = np.abs(np.polynomial.polynomial.polyval(s, fitted).T - values).max()
-        assert (off < 1e-10) == (power == degree)
-    whole = pieces(rows, 1)
-    for theta in (0.001, 0.37, 0.999, 1.0):
-        cut = Dense.of(cutting(Record(2, rows))(theta, whole.rows[0]).full().T, 2)
-        assert (cut.t0.tolist(), cut.t1.tolist()) == ([0.0], [theta])
-        times = np.linspace(0, theta, 101)
-        assert cut(times) == pytest.approx(whole(times), abs=1e-12)
-
-
-def test_value_at_a_jump_is_that_after_it() -> None:
-    first, second = pieces(1, 1, 1), pieces(1, 1, 1)
-    both = Dense.of(
-        np.vstack([first.rows, replace(second, t0=second.t0 + 1, t1=second.t1 + 1).rows]), 1
-    )
-    assert both(np.array([1.0]))[0, 0] == second.y0[0, 0]
-    assert both(np.array([np.nextafter(1.0, 0)]))[0, 0] == pytest.approx(first.y1[0, 0])
-    assert both(np.array([2.0]))[0, 0] == pytest.approx(second.y1[0, 0])
 
 
 @pytest.mark.parametrize("method", ["rodas5p", "rodas4p", "rodas3"])

@@ -11,11 +11,7 @@ from grazing import wrong
 from oracles import damped_block_events
 
 from symfric import Event, ExactCoulomb, Model, Variable, rabinowicz, simulate
-from symfric.integrator.equations.inputs import input_data
-from symfric.integrator.methods.tableaux import ADAPTIVE
-from symfric.integrator.running.crossings import STRAIGHT
 from symfric.integrator.running.events import Change, Search, Stop
-from symfric.integrator.running.integrator import Integrator
 
 x, c, w = Variable("x", "1"), Variable("c", "1"), Variable("w", "1")
 X, C, W = x.symbol, c.symbol, w.symbol
@@ -102,39 +98,6 @@ def test_roots_that_share_a_quarter_come_in_order(backend: str, direction: int) 
             ways = [sign * (-1) ** (count - 1 - k) for k in range(count)]
             expected = [r for r, way in zip(roots, ways, strict=False) if way * direction >= 0]
             assert crossings(model, sign, backend=backend) == pytest.approx(expected, abs=2e-10)
-
-
-def test_a_piece_that_is_not_in_doubt_has_the_roots_that_its_ends_show() -> None:
-    """Polynomials of degree 4, and lines with a corner, near zero somewhere in the step.
-
-    Values far above their bends are not in doubt, which compiled code tests first.
-    """
-    model = clock(X)
-    found = Integrator(model, input_data(model, None, 0.0, 1.0), ADAPTIVE["rodas5p"]).crossings
-    assert found is not None
-    rng, fine, n = np.random.default_rng(3), np.linspace(0, 1, 401)[:, None], 4000
-    bends, corner = rng.uniform(-1, 1, (2, n)), rng.uniform(0, 1, n)
-    for values in (
-        np.polyval(rng.standard_normal((5, 1, n)), fine),
-        bends[0] * (fine - corner) + 2 * np.maximum(fine - corner, 0) * bends[1],
-    ):
-        every = values - values[rng.integers(0, 401, n), np.arange(n)] + rng.normal(0, 1e-2, n)
-        doubt = found.doubts(every[::100], 0.0).full() != 0
-        changes = np.diff(np.sign(every), axis=0).reshape(4, 100, -1) != 0
-        ends = np.diff(np.sign(every[::100]), axis=0) != 0
-        assert (changes.sum(axis=1) == ends)[~doubt].all()
-        assert (changes.sum(axis=1) > ends).any()
-        assert doubt.mean() < 0.7
-    curves = rng.standard_normal((3, n)) * 10 ** rng.uniform(-3, 0, (3, n))
-    start, slope = rng.standard_normal((2, n))
-    g = start + np.arange(5)[:, None] * slope
-    g = g + np.vstack([np.zeros((2, n)), curves.cumsum(axis=0).cumsum(axis=0)])
-    least, most = np.abs(g).min(axis=0), np.abs(np.diff(g, 2, axis=0)).sum(axis=0)
-    doubt, straight = found.doubt(g, 0.0).full().any(axis=0), least >= STRAIGHT * most
-    assert n / 9 < straight.sum() < 8 * n / 9
-    assert not doubt[straight].any()
-    assert doubt[~straight & (least >= 0.8 * STRAIGHT * most)].any()
-    assert (np.diff(np.sign(g[:, straight]), axis=0) != 0).sum(axis=0).max() == 1
 
 
 def test_the_earlier_of_two_events_happens_first() -> None:

@@ -1,0 +1,42 @@
+"""Moves that only friction stops, which wide layers cannot, against the closed form."""
+
+from math import sqrt
+
+import numpy as np
+import pytest
+
+from ocp import Free, Phase, Problem, integral, solve
+from symfric import BrownMcPhee, ExactCoulomb, Law
+from symfric.multibody import DiscClutch, Mechanism, Revolute
+
+MU, INERTIA, RADIUS = 0.35, 0.1, 0.15
+
+
+@pytest.mark.parametrize(
+    ("law", "speed", "most"),
+    [
+        (ExactCoulomb(mu_s=0.5, mu_d=MU), 20.0, 500.0),
+        (ExactCoulomb(mu_s=MU, mu_d=MU), 20.0, 200.0),
+        pytest.param(ExactCoulomb(mu_s=MU, mu_d=MU), 20.0, 500.0, marks=pytest.mark.slow),
+        pytest.param(ExactCoulomb(mu_s=MU, mu_d=MU), 200.0, 500.0, marks=pytest.mark.slow),
+        pytest.param(BrownMcPhee(mu_s=MU, mu_d=MU, v_t=1e-3), 20.0, 500.0, marks=pytest.mark.slow),
+    ],
+)
+def test_a_brake_stops_a_wheel_at_least_cost(law: Law, speed: float, most: float) -> None:
+    m = Mechanism("wheel")
+    m.body("wheel", mass=5.0, inertia=(INERTIA, INERTIA, INERTIA))
+    m.joint(Revolute("shaft", "ground", "wheel"))
+    pedal = m.input("pedal", "N", nominal=100.0)
+    m.force(DiscClutch("brake", "shaft", law, pedal, RADIUS, RADIUS))
+    phase = Phase(
+        m.build(), Free(0.01, 50.0), start={"shaft": 0.0, "shaft_rate": speed},
+        end={"shaft_rate": 0.0}, bounds={"pedal": (0.0, most)},
+    )  # fmt: skip
+    found = solve(Problem(phase, integral(lambda s: 1 + 1e-5 * s.pedal**2)))
+    # the cost per angular momentum, (1 + k P^2) / (mu r P), is least at P = 1 / sqrt(k)
+    force = min(most, 1 / sqrt(1e-5))
+    T = speed * INERTIA / (MU * RADIUS * force)
+    assert found.verified and found.cost == pytest.approx(T * (1 + 1e-5 * force**2), rel=1e-6)
+    assert pytest.approx(T, rel=1e-5) == found.T
+    if isinstance(law, ExactCoulomb):
+        assert np.all(found["brake_mode"] == 1.0)
