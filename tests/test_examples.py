@@ -151,15 +151,8 @@ def many_machines(printed: str) -> bool:
 
 
 LONG = {
-    *(
-        "adapt_drive",
-        "arm_to_a_place",
-        "co_design",
-        "compensate_drive",
-        "crank_start_up",
-        "identify_arm",
-    ),
-    *("identify_emps", "identify_excitation", "identify_franka", "identify_gms"),
+    *("adapt_drive", "arm_to_a_place", "co_design", "compensate_drive", "crank_start_up"),
+    *("identify_arm", "identify_emps", "identify_excitation", "identify_franka", "identify_gms"),
     *("identify_pendulum", "identify_raw_files", "quarter_car_profile", "robot_feed_forward"),
     *("swing_up", "through_a_spring"),
 }

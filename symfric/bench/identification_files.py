@@ -18,6 +18,7 @@ from typing import Any, Literal, final
 import numpy as np
 
 from identification import synthetic_drive_data
+from symfric.bench.identification_records import with_play
 from symfric.foundation.numeric import Array
 
 Truth = Literal["good", "bad", "hidden"]
@@ -310,11 +311,7 @@ def _disturbed(rng: np.random.Generator) -> dict[str, Spoil]:
         return F - 0.3 * t / t[-1] * 22 * np.tanh(np.gradient(x, 1e-3) / 1e-3)
 
     def backlash(t: Array, x: Array, F: Array) -> Array:
-        stage, seen = x[0], np.empty(x.size)
-        for k, motor in enumerate(x.tolist()):
-            stage = min(max(stage, motor - 2.5e-4), motor + 2.5e-4)
-            seen[k] = stage
-        return seen + 1e-7 * rng.standard_normal(x.size)
+        return with_play(x, 5e-4) + 1e-7 * rng.standard_normal(x.size)
 
     def low_pass(t: Array, x: Array, F: Array) -> Array:
         return np.convolve(x, np.exp(-np.arange(60) / 5) / 5.516655)[: x.size]

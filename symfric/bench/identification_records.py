@@ -1,8 +1,8 @@
 """Records of a stage for the bank of scenes: motions, friction in closed form, and errors.
 
 Forces follow from the imposed motion, F_e = m v' + F(v) + offset; bristles take exact steps on a
-grid ten times finer than the record. An error of the record is a function of a generator, the exact
-motion and force that returns recorded positions and forces.
+grid ten times finer than the record. Errors of the record are functions of a generator and of the
+exact motion and force that return recorded positions or forces.
 """
 
 from collections.abc import Callable
@@ -100,104 +100,56 @@ def ar(rng: Generator, n: int, rho: float, size: float) -> Array:
     return size * e
 
 
-Change = Callable[[Generator, SampledMotion, Array], tuple[Array, Array]]
-"""Function of generator, motion and exact force that returns recorded positions and forces."""
+Seen = Callable[[Generator, SampledMotion], Array]
+"""Function of generator and motion that returns recorded positions."""
 
 
-def exact(rng: Generator, m: SampledMotion, F: Array) -> tuple[Array, Array]:
-    """Return the record without further errors."""
-    del rng
-    return m.x, F
-
-
-def encoder(step: float) -> Change:
+def encoder(step: float) -> Seen:
     """Return the rounding of positions to multiples of `step` [m]."""
-
-    def change(rng: Generator, m: SampledMotion, F: Array) -> tuple[Array, Array]:
-        return step * np.round((m.x + step * rng.uniform()) / step), F
-
-    return change
+    return lambda rng, m: step * np.round((m.x + step * rng.uniform()) / step)
 
 
-def jitter(rng: Generator, m: SampledMotion, F: Array) -> tuple[Array, Array]:
+def jitter(rng: Generator, m: SampledMotion) -> Array:
     """Return positions at times that scatter by 0.3 ms."""
-    return np.interp(m.t + 3e-4 * rng.standard_normal(m.t.size), m.t, m.x), F
+    return np.interp(m.t + 3e-4 * rng.standard_normal(m.t.size), m.t, m.x)
 
 
-def delay(rng: Generator, m: SampledMotion, F: Array, late: float = 2e-3) -> tuple[Array, Array]:
-    """Return forces that are `late` [s]."""
-    del rng
-    return m.x, np.interp(m.t - late, m.t, F)
-
-
-def backlash(rng: Generator, m: SampledMotion, F: Array, play: float = 2e-5) -> tuple[Array, Array]:
-    """Return positions of an encoder that follows the stage with a play [m]."""
-    del rng
-    path = [m.x[0]]
-    for x in m.x[1:].tolist():
+def with_play(positions: Array, play: float) -> Array:
+    """Return positions of an encoder that follows the stage with a `play` [m]."""
+    path = [positions[0]]
+    for x in positions[1:].tolist():
         path.append(min(max(path[-1], x - play / 2), x + play / 2))
-    return np.array(path), F
+    return np.array(path)
 
 
-def saturated(rng: Generator, m: SampledMotion, F: Array) -> tuple[Array, Array]:
-    """Return forces of a sensor that loses 10 % of the gain at the largest force."""
-    del rng
-    return m.x, F * (1 - 0.1 * (F / np.abs(F).max()) ** 2)
-
-
-def loaded(rng: Generator, m: SampledMotion, F: Array) -> tuple[Array, Array]:
-    """Return forces of a guide that rubs with 5 % of the force of inertia."""
-    del rng
-    return m.x, F + 0.05 * M * np.abs(m.a) * np.sign(m.v)
-
-
-def drift(rng: Generator, m: SampledMotion, F: Array) -> tuple[Array, Array]:
-    """Return forces whose viscous part falls by 30 % over time, and the Coulomb level by 10 %."""
-    del rng
-    share = m.t / m.t[-1]
-    return m.x, F - share * (0.3 * CURVE["sigma_2"] * m.v + 0.1 * CURVE["mu_d"] * np.sign(m.v))
-
-
-def warm_up(rng: Generator, m: SampledMotion, F: Array) -> tuple[Array, Array]:
+def warm_up(rng: Generator, m: SampledMotion, F: Array) -> Array:
     """Return forces whose viscous part falls by 30 % with the dissipated energy."""
     del rng
     heat = np.cumsum(np.abs(m.v))
-    return m.x, F - 0.3 * (1 - np.exp(-3 * heat / heat[-1])) * CURVE["sigma_2"] * m.v
+    return F - 0.3 * (1 - np.exp(-3 * heat / heat[-1])) * CURVE["sigma_2"] * m.v
 
 
-def uneven(rng: Generator, m: SampledMotion, F: Array) -> tuple[Array, Array]:
-    """Return forces with a Coulomb level that varies by 6 % over the position."""
-    way = 2 * np.pi * (m.x / 0.05 + rng.uniform())
-    return m.x, F + 0.06 * CURVE["mu_d"] * np.sign(m.v) * np.sin(way)
-
-
-def cogging(rng: Generator, m: SampledMotion, F: Array) -> tuple[Array, Array]:
-    """Return forces with a ripple of 2 N over the position."""
-    return m.x, F + 2.0 * np.sin(2 * np.pi * (m.x / 0.01 + rng.uniform()))
-
-
-def clipped(rng: Generator, m: SampledMotion, F: Array) -> tuple[Array, Array]:
-    """Return forces limited to 80 % of the largest one."""
-    del rng
-    most = 0.8 * np.abs(F).max()
-    return m.x, np.clip(F, -most, most)
-
-
-def held(rng: Generator, m: SampledMotion, F: Array) -> tuple[Array, Array]:
-    """Return forces of which the logger stores every fourth one four times."""
-    del rng
-    return m.x, F[4 * (np.arange(F.size) // 4)]
-
-
-def gained(rng: Generator, m: SampledMotion, F: Array) -> tuple[Array, Array]:
-    """Return forces of a sensor with a gain of 1.05 in one direction."""
-    del rng
-    return m.x, np.where(F > 0, 1.05, 1.0) * F
-
-
-def heavy_tails(rng: Generator, m: SampledMotion, F: Array) -> tuple[Array, Array]:
-    """Return forces with noise of Student's t distribution with four degrees of freedom."""
-    return m.x, F + 0.3 * rng.standard_t(4, F.size)
+FELT: dict[str, Callable[[Generator, SampledMotion, Array], Array]] = {
+    "2 ms late": lambda rng, m, F: np.interp(m.t - 2e-3, m.t, F),
+    "1 ms late": lambda rng, m, F: np.interp(m.t - 1e-3, m.t, F),
+    "gain falls by 10 %": lambda rng, m, F: F * (1 - 0.1 * (F / np.abs(F).max()) ** 2),
+    "one-sided gain": lambda rng, m, F: np.where(F > 0, 1.05, 1.0) * F,
+    "limited to 80 %": lambda rng, m, F: np.clip(F, *(np.abs(F).max() * np.array([-0.8, 0.8]))),
+    "held four times": lambda rng, m, F: F[4 * (np.arange(F.size) // 4)],
+    "heavy tails": lambda rng, m, F: F + 0.3 * rng.standard_t(4, F.size),
+    "cogging of 2 N": lambda rng, m, F: (
+        F + 2.0 * np.sin(2 * np.pi * (m.x / 0.01 + rng.uniform()))
+    ),
+    "rubs with 5 % of inertia": lambda rng, m, F: F + 0.05 * M * np.abs(m.a) * np.sign(m.v),
+    "friction falls": lambda rng, m, F: (
+        F - m.t / m.t[-1] * (0.3 * CURVE["sigma_2"] * m.v + 0.1 * CURVE["mu_d"] * np.sign(m.v))
+    ),
+    "warms up": warm_up,
+    "level varies by 6 %": lambda rng, m, F: F + 0.06 * CURVE["mu_d"] * np.sign(m.v) * np.sin(
+        2 * np.pi * (m.x / 0.05 + rng.uniform())
+    ),
+}  # fmt: skip
+"""Functions of generator, motion and exact force that return recorded forces."""
 
 
 def asymmetric(v: Array) -> Array:

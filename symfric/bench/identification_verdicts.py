@@ -54,9 +54,9 @@ class Setup:
 
 def stage(
     rng: Generator, *, law: str = "stribeck", friction: Callable[[Array], Array] | None = None,
-    change: records.Change = records.exact, noise: float = records.NOISE, rho: float = 0.0,
-    position: float = 1e-7, bristles: bool = False, given: Mapping[str, Any] | None = None,
-          **moves: Any,
+    seen: records.Seen | None = None, felt: str = "", noise: float = records.NOISE,
+    rho: float = 0.0, position: float = 1e-7, bristles: bool = False,
+    given: Mapping[str, Any] | None = None, **moves: Any,
 ) -> Fit:  # fmt: skip
     """Return the fit of a stage by inverse dynamics.
 
@@ -64,7 +64,8 @@ def stage(
         rng: generator of motion and noise.
         law: fitted law.
         friction: true friction over velocity; None: with a Stribeck peak.
-        change: further errors of the record.
+        seen: errors of the recorded positions.
+        felt: errors of the recorded forces, a name of `FELT`.
         noise, rho: standard deviation [N] and correlation from sample to sample of the force noise.
         position: standard deviation of the white noise of positions [m].
         bristles: the true friction is that of LuGre.
@@ -75,7 +76,8 @@ def stage(
     m, of_v = whole.sampled(), friction or partial(records.curve, **CURVE)
     rubbed = records.bristle(whole.t, whole.v)[:: records.FINE] if bristles else of_v(m.v)
     noisy = M * m.a + rubbed + OFFSET + records.ar(rng, m.t.size, rho, noise)
-    x, force = change(rng, m, noisy)
+    force = records.FELT[felt](rng, m, noisy) if felt else noisy
+    x = seen(rng, m) if seen else m.x
     data = Dataset.of(t=m.t, x=x + position * rng.standard_normal(x.size), force=force)
     return Fit(InverseDynamics(), law, data, **(given or {}))
 
@@ -177,20 +179,20 @@ SCENES = (
     Setup("stage, position noise 1 um", "record", partial(stage, position=1e-6), STRIBECK),
     Setup("stage, position noise 5 um", "record", partial(stage, position=5e-6), STRIBECK),
     Setup("stage, encoder 5 um", "record",
-          partial(stage, position=0.0, change=records.encoder(5e-6)), STRIBECK),
+          partial(stage, position=0.0, seen=records.encoder(5e-6)), STRIBECK),
     Setup("stage, encoder 20 um", "record",
-          partial(stage, position=0.0, change=records.encoder(2e-5)), STRIBECK),
-    Setup("stage, jitter 0.3 ms", "record", partial(stage, change=records.jitter), STRIBECK),
-    Setup("stage, delay 2 ms", "record", partial(stage, change=records.delay), STRIBECK),
-    Setup("stage, clipped force", "record", partial(stage, change=records.clipped), STRIBECK),
+          partial(stage, position=0.0, seen=records.encoder(2e-5)), STRIBECK),
+    Setup("stage, jitter 0.3 ms", "record", partial(stage, seen=records.jitter), STRIBECK),
+    Setup("stage, delay 2 ms", "record", partial(stage, felt="2 ms late"), STRIBECK),
+    Setup("stage, clipped force", "record", partial(stage, felt="limited to 80 %"), STRIBECK),
     Setup("stage, one direction", "record", partial(stage, one_way=True), STRIBECK),
     Setup("bristles, position noise 0.2 um", "record",
           partial(memory, creeping=True, position=2e-7), {"sigma_0": BRISTLE["sigma_0"]}),
     Setup("bristles, loaded start", "record", partial(memory, start=0.9), BRISTLE),
-    Setup("stage, drift in time", "wrong", partial(fine, change=records.drift), STRIBECK),
-    Setup("stage, warming up", "wrong", partial(fine, change=records.warm_up), STRIBECK),
-    Setup("stage, uneven track", "wrong", partial(fine, change=records.uneven), STRIBECK),
-    Setup("stage, cogging", "wrong", partial(fine, change=records.cogging), STRIBECK),
+    Setup("stage, drift in time", "wrong", partial(fine, felt="friction falls"), STRIBECK),
+    Setup("stage, warming up", "wrong", partial(fine, felt="warms up"), STRIBECK),
+    Setup("stage, uneven track", "wrong", partial(fine, felt="level varies by 6 %"), STRIBECK),
+    Setup("stage, cogging", "wrong", partial(fine, felt="cogging of 2 N"), STRIBECK),
     Setup("stage, wrong mass", "wrong", partial(fine, given={"fixed": {"m": 0.95 * M}}), STRIBECK),
     Setup("stage, no peak in the model", "wrong", partial(fine, law="coulomb+viscous"), COULOMB),
     Setup("stage, bristles as coulomb+viscous", "wrong",
@@ -202,31 +204,31 @@ SCENES = (
           partial(points, law=SteadyStateLuGre(), friction=flat, free=["delta"]),
           {"sigma_2": CURVE["sigma_2"]}),
     Setup("shooting, no peak in the model", "wrong", partial(shooting, law=PEAK), BLOCK),
-    Setup("kept: stage, heavy tails", "right", partial(simple, change=records.heavy_tails),
+    Setup("kept: stage, heavy tails", "right", partial(simple, felt="heavy tails"),
           COULOMB),
     Setup("kept: stage, asymmetric law", "right",
           partial(simple, law="asymmetric(coulomb+viscous)", friction=records.asymmetric, rho=0.5),
           {"m": M, "mu_d_pos": 22.0 + OFFSET, "mu_d_neg": 20.0 - OFFSET, "sigma_2_pos": 220.0,
           "sigma_2_neg": 200.0}),
     Setup("kept: curve of few points", "right", partial(points, count=30), CURVE),
-    Setup("stage, held force", "record", partial(fine, change=records.held), STRIBECK),
+    Setup("stage, held force", "record", partial(fine, felt="held four times"), STRIBECK),
     Setup("kept: stage, encoder 1 um, AR(1) 0.7", "record",
-          partial(stage, position=0.0, change=records.encoder(1e-6), rho=0.7), STRIBECK),
-    Setup("stage, one-sided gain", "wrong", partial(simple, change=records.gained), COULOMB),
+          partial(stage, position=0.0, seen=records.encoder(1e-6), rho=0.7), STRIBECK),
+    Setup("stage, one-sided gain", "wrong", partial(simple, felt="one-sided gain"), COULOMB),
     Setup("kept: stage, root of the speed", "wrong", partial(simple, friction=records.root),
           COULOMB),
     Setup("kept: stage, warming up, coulomb+viscous", "wrong",
-          partial(simple, change=records.warm_up), COULOMB),
+          partial(simple, felt="warms up"), COULOMB),
     Setup("kept: shooting, missing spring", "wrong", partial(shooting, spring=0.5), BLOCK),
     Setup("kept: stage, delay 1 ms, AR(1) 0.7", "record",
-          partial(stage, change=partial(records.delay, late=1e-3), rho=0.7), STRIBECK),
+          partial(stage, felt="1 ms late", rho=0.7), STRIBECK),
     Setup("kept: bristles, position noise 1 um", "record", partial(memory, position=1e-6), BRISTLE),
-    Setup("kept: stage, backlash of the encoder", "record", partial(stage, change=records.backlash),
-          STRIBECK),
-    Setup("kept: stage, saturating sensor", "wrong", partial(simple, change=records.saturated),
+    Setup("kept: stage, backlash of the encoder", "record",
+          partial(stage, seen=lambda rng, m: records.with_play(m.x, 2e-5)), STRIBECK),
+    Setup("kept: stage, saturating sensor", "wrong", partial(simple, felt="gain falls by 10 %"),
           COULOMB),
     Setup("kept: stage, friction of the guide under load", "wrong",
-          partial(simple, change=records.loaded), COULOMB),
+          partial(simple, felt="rubs with 5 % of inertia"), COULOMB),
 )  # fmt: skip
 
 

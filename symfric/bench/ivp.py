@@ -4,7 +4,7 @@ This file has the problems of mechanisms, Andrews' squeezer and the car axis; `i
 others.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from functools import partial
 from math import nan
 
@@ -256,13 +256,9 @@ DIGITS = "Correct digits of the worst signal at the end"
 DRIFT = "Drift of constraints that are imposed on the accelerations only"
 
 
-def bench(
-    quick: bool = False,
-    problems: Sequence[InitialValueProblem] = PROBLEMS,
-    progress: Progress = None,
-) -> Report:
+def bench(quick: bool = False, progress: Progress = None) -> Report:
     """Measure all problems; with `quick`, at rtol 1e-6 only."""
-    tasks = {problem.name: partial(_rows, problem, quick) for problem in problems}
+    tasks = {problem.name: partial(_rows, problem, quick) for problem in PROBLEMS}
     draw = curves("problem", ("method",), "relative error", "time per run [ms]")
     source = f"Problems and published values: {TEST_SET}."
     return Report((DIGITS, draw), notes=[source]).collect(tasks, progress)

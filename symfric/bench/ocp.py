@@ -10,7 +10,7 @@ import contextlib
 import io
 import os
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from functools import partial
 from importlib import import_module
 from itertools import pairwise
@@ -29,7 +29,6 @@ from symfric.bench.ocp_contenders import Attempt, Contender, even, guesses_of
 from symfric.bench.ocp_referee import ControlVerdict, judged
 from symfric.bench.report import Found, Progress, Report, Row, curves
 from symfric.foundation.numeric import Array
-from symfric.foundation.parameters import check_names
 from symfric.foundation.programs import find_compiler
 
 LIMIT, QUICK_LIMIT = 20.0, 3.0
@@ -41,24 +40,20 @@ TITLE = (
 TIME, COST, MISS = "processor time [s]", "cost by the referee", "relative miss by the referee"
 
 
-def bench(
-    quick: bool = False, cases: Sequence[str] | None = None, progress: Progress = None
-) -> Report:
+def bench(quick: bool = False, progress: Progress = None) -> Report:
     """Compare the contenders in 10 to 15 minutes on one core, or in one minute with `quick`.
 
     Args:
         quick: fewer problems, one width of smooth friction, no controllers.
-        cases: names of problems; by default all of them, and controllers.
         progress: called with the current item, the fraction done and each row.
     """
-    known = {case.name: case for case in CASES}
-    check_names("bench ocp", cases or (), known)
     tasks: dict[str, Callable[[], Iterator[Found]]] = {
-        f"{name}, {who}": partial(_found, known[name], who, contender, quick)
-        for name in cases or (QUICK if quick else known)
+        f"{case.name}, {who}": partial(_found, case, who, contender, quick)
+        for case in CASES
+        if case.name in QUICK or not quick
         for who, contender in contenders(quick).items()
     }
-    if not cases and not quick:
+    if not quick:
         tasks["controllers"] = controllers
     draw = curves("problem", ("contender",), TIME, COST, MISS)
     return Report((TITLE, draw)).collect(tasks, progress)

@@ -128,26 +128,20 @@ CASES = (
 )  # fmt: skip
 
 
-def bench(
-    quick: bool = False,
-    cases: Sequence[LawCase] = CASES,
-    factors: Sequence[float] = HALF_DECADES,
-    rtols: Sequence[float] = RTOLS,
-    progress: Progress = None,
-) -> Report:
+def bench(quick: bool = False, progress: Progress = None) -> Report:
     """Run every case at every width and tolerance, compiled if there is a compiler.
 
     With `quick`, every second width is run twice in the virtual machine.
     """
-    factors = factors[::2] if quick else factors
+    factors = HALF_DECADES[::2] if quick else HALF_DECADES
     how = {"rounds": 2 if quick else ROUNDS, "engine": "vm" if quick else backend()}
-    tasks = {case.name: partial(_rows, case, factors, rtols, **how) for case in cases}
+    tasks = {case.name: partial(rows, case, factors, RTOLS, **how) for case in CASES}
     draw = curves("case", ("rtol",), "value", "error", "error of the last cycle",
                   "time per run [ms]")  # fmt: skip
     return Report((TITLE, draw)).collect(tasks, progress)
 
 
-def _rows(
+def rows(
     case: LawCase, factors: Sequence[float], rtols: Sequence[float], rounds: int, engine: str
 ) -> Iterator[Found]:
     """Yield the rows of a case, tolerance by tolerance, width by width."""

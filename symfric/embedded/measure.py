@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from symfric.codegen.blocks.block import Block, CBlock
 from symfric.codegen.fixed.generated import FixedPoint
 from symfric.codegen.generated import Generated
-from symfric.codegen.runner import compiled, evaluated, run_c, run_vm
+from symfric.codegen.runner import compiled, run_c, run_vm
 from symfric.codegen.verification import motions
 from symfric.embedded.target import (
     BY,
@@ -157,19 +157,17 @@ def measure_fixed(made: FixedPoint, core: str = "m0plus") -> BlockMeasurement:
     Inputs are those of `measure`, clamped to their ranges.
     """
     checks.choice("embedded: core", core, CORES)
-    block, real, found = made.model, made.c.real.name, find_tools()
-    if isinstance(found, Absent):
-        return BlockMeasurement(block.name, real, core, status=f"skipped: {found.advice}")
-    states, names = ([v.name for v in group] for group in (block.states, block.inputs))
-    further, ends = regimes(block), [*states, *block.outputs]
-    low, high = np.array([made.ranges[name] for name in names]).reshape(-1, 2).T
-    inputs = np.clip(np.vstack([day(block, STEPS), *further.values()]), low, high)
-    target, whole = Target(CORES[core], found, ("-O2",)), np.rint(inputs * made.scales(names))
+    block, real, tools = made.model, made.c.real.name, find_tools()
+    if isinstance(tools, Absent):
+        return BlockMeasurement(block.name, real, core, status=f"skipped: {tools.advice}")
+    names, ends = [v.name for v in block.inputs], [*(v.name for v in block.states), *block.outputs]
+    further = regimes(block)
+    inputs = made.clamped(names, np.vstack([day(block, STEPS), *further.values()]))
+    target, whole = Target(CORES[core], tools, ("-O2",)), np.rint(inputs * made.scales(names))
     write = partial(of_c, made.c)
     rows, cost = _on_core(made.c, target, write, whole, STEPS, further)
-    before = np.vstack([np.zeros(len(states)), rows[:-1, : len(states)] / made.scales(states)])
-    expected = evaluated(block.step, before, np.zeros((len(rows), 0)), inputs)
-    error = _error(block, rows / made.scales(ends), expected)
+    found = rows / made.scales(ends)
+    error = _error(block, found, made.expected(found, inputs))
     return BlockMeasurement(block.name, real, core, error=error, **cost)
 
 

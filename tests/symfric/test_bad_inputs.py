@@ -219,25 +219,15 @@ test_every_entry_point_refuses_bad_input_in_a_sentence = entry_points_refuse(
 
 
 KINDS: tuple[Callable[[float], Any], ...] = (
-    float,
-    np.float32,
-    np.float64,
-    np.float16,
-    np.array,
-    lambda x: np.array(x, np.float32),
-    ca.DM,
-    ca.SX,
+    *(float, np.float32, np.float64, np.float16, np.array, lambda x: np.array(x, np.float32)),
+    *(ca.DM, ca.SX),
 )
 """All of them hold 0.5 and 2 exactly."""
 PLAIN = KINDS[:-2]
 """Those of Python and NumPy."""
 WHOLE: tuple[Callable[[int], Any], ...] = (int, np.int64, np.uint8, np.int16, float, np.array)
 ROWS: tuple[Callable[[list[float]], Any], ...] = (
-    list,
-    tuple,
-    np.array,
-    lambda x: np.array(x, np.float32),
-    ca.DM,
+    *(list, tuple, np.array, lambda x: np.array(x, np.float32), ca.DM),
 )
 
 
@@ -321,7 +311,7 @@ def test_every_kind_of_number_describes_a_machine() -> None:
 
 def test_every_kind_of_number_is_taken_by_the_tools() -> None:
     model = sf.drive(sf.BrownMcPhee())
-    data = synthetic_drive_data(speeds=(0.01, 0.05))
+    data = synthetic_drive_data(speeds=(0.01, 0.05), rate=250.0)
     t = np.linspace(0.0, 0.05, 60)
     belt = sf.rabinowicz(sf.BrownMcPhee(), free=["mu_d"])
     truth = sf.simulate(belt, 0.05, t_eval=t, x0={"v": 0.5})

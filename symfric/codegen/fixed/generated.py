@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from math import ceil, floor
+from math import ceil, floor, inf
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import final
@@ -60,6 +60,26 @@ class FixedPoint:
     def scales(self, names: Sequence[str]) -> Array:
         """Return the integers of one unit of some variables."""
         return 2.0 ** np.array([self.bits[name] for name in names])
+
+    def clamped(self, names: Sequence[str], values: Array) -> Array:
+        """Return states or inputs, shape (steps, names), within their ranges, as in the C."""
+        scales = self.scales(names)
+        low, high = np.array([self.ranges[name] for name in names]).reshape(-1, 2).T * scales
+        return np.clip(values, np.ceil(low) / scales, np.floor(high) / scales)
+
+    def expected(self, found: Array, inputs: Array) -> Array:
+        """Return states and outputs by CasADi in every step, from the states of the C before it.
+
+        Args:
+            found: states and outputs of the C, shape (steps, states + outputs).
+            inputs: inputs in their units, shape (steps, inputs).
+        """
+        names = [v.name for v in self.model.states]
+        before = np.vstack([np.zeros(len(names)), found[:-1, : len(names)]])
+        given = self.clamped(names, before), np.zeros((len(inputs), 0)), inputs
+        most = [max(map(abs, self.ranges[name])) for name in names]
+        most = np.array(most + [inf] * len(self.model.outputs))
+        return np.clip(evaluated(self.model.step, *given), -most, most)
 
 
 def fixed_point(
@@ -277,15 +297,14 @@ def compare(
     """
     model = made.model
     states, given = ([v.name for v in group] for group in (model.states, model.inputs))
-    ends, scales = np.array([made.ranges[name] for name in given]).T, made.scales(given)
-    whole = np.clip(np.rint(inputs * scales), np.ceil(ends[0] * scales), np.floor(ends[1] * scales))
+    scales = made.scales(given)
+    rounded = made.clamped(given, np.rint(inputs * scales) / scales)
     with TemporaryDirectory(prefix="symfric-") as folder:
         target = Path(folder) / f"{made.c.name}.o"
         warnings = compile_object(compiler, made.files[1], target)
-        rows = run_c(made.c, compiled(made.c, [target], made.folder, compiler), whole)
+        rows = run_c(made.c, compiled(made.c, [target], made.folder, compiler), rounded * scales)
     names = [*states, *model.outputs]
     found = rows / made.scales(names)
-    before = np.vstack([np.zeros(len(states)), found[:-1, : len(states)]])
-    expected = evaluated(model.step, before, np.zeros((len(whole), 0)), whole / scales)
+    expected = made.expected(found, rounded)
     worst = (np.abs(found - expected) - ROUNDED * np.spacing(np.abs(expected))).max(axis=0)
     return dict(zip(names, worst.tolist(), strict=True)), warnings

@@ -254,6 +254,7 @@ def test_overdetermined_programs_are_reported() -> None:
     [
         (fastest_move(1e-4), 5, True),
         (fastest_move(0.5), 5, False),
+        (fastest_move(0.5), 1, False),
         (fastest_move(1e-4), 300, False),  # it is solved
         (ONWARDS, 1, False),  # the contact never reverses
     ],

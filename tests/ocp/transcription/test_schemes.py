@@ -5,14 +5,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from discretised import (
-    EFFORT,
-    angles,
-    double_pendulum,
-    four_bar,
-    mean_of_scenarios,
-    stage,
-)
+from discretised import EFFORT, angles, double_pendulum, four_bar, mean_of_scenarios, stage
 from numpy.polynomial import Polynomial
 from phases import on, slider_crank
 

@@ -97,6 +97,10 @@ def test_integers_do_not_overflow(name, compiler, tmp_path):
     agrees(formula(FORMULAS[name], tmp_path), compiler, 3000)
 
 
+def test_states_are_clamped_to_their_ranges(compiler, tmp_path):
+    agrees(fixed_point(AXIS, tmp_path, ON_AXIS | {"z": (-2e-5, 1e-5)}, h=1e-3), compiler, 3000)
+
+
 def test_the_bound_is_close_to_the_largest_error(compiler, tmp_path):
     made = fixed_point(BrownMcPhee(), tmp_path, RANGES)
     errors, _ = compare(made, compiler, random_inputs(made, 3000))

@@ -10,11 +10,7 @@ from slides import BRISTLES, MAKE, NOISE, STATIC, H, columns, inputs, slid
 import symfric as sf
 from symfric.codegen import generate, verify
 from symfric.codegen.contract import fuzz
-from symfric.compensation import (
-    compensator,
-    kalman_estimator,
-    recursive_estimator,
-)
+from symfric.compensation import compensator, kalman_estimator, recursive_estimator
 from symfric.compensation.adapted import Adapted
 from symfric.compensation.estimators import prediction
 from symfric.scenes import Drive

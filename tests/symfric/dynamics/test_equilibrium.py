@@ -16,7 +16,7 @@ from symfric import (
     simulate,
 )
 from symfric.dynamics import equilibrium, linearize
-from symfric.laws import Stribeck, Viscous
+from symfric.laws import Asymmetric, Coulomb, Exact, Stribeck, Viscous
 from symfric.scenes import Arm, CoupledBlocks, FourBar, Pendulum, SliderCrank
 
 SEEDS = range(20)
@@ -125,6 +125,9 @@ def test_contacts_at_rest_survive_loads_up_to_their_levels() -> None:
             (guide,) = at.contacts
             assert guide.state == "stick" and guide.margin == pytest.approx(1.1772 - abs(load))
             assert at.survives("force") == pytest.approx((-1.1772, 1.1772), rel=1e-9)
+    uneven = Exact(Asymmetric(Coulomb(mu_d=0.1), Coulomb(mu_d=0.3)))
+    at = equilibrium(drive(uneven), u={"force": -1.0})
+    assert at.survives("force") == pytest.approx((-2.3544, 0.7848), rel=1e-9)
     at = equilibrium(two_blocks(second=False), u={"force": 1.0})
     # the free block follows the force, and the spring passes it on to the floor
     assert at.x["x_2"] - at.x["x_1"] == pytest.approx(1.0 / 50.0)
