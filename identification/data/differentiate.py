@@ -86,9 +86,9 @@ class Velocity:
 
         V = V_x + W (V_v - V_x),   W = E_x / (E_x + E_v),   E = W^2 E_v + (1 - W)^2 E_x
 
-    With W averaged over 1 Hz or 99 frequencies, this has almost the least noise of all unbiased
-    combinations. E_x is white noise of the position after the difference of fourth order, with the
-    gain s instead of w, plus the bias of this difference:
+    With W averaged over 1/500 of the band or 99 frequencies, this has almost the least noise of
+    all unbiased combinations. E_x is white noise of the position after the difference of fourth
+    order, with the gain s instead of w, plus the bias of this difference:
 
         E_x = S_x s^2 + (1 - s / w)^2 (|V_v|^2 - S_v)
 
@@ -149,16 +149,16 @@ class Velocity:
         of_v = velocity_noise(measured) if v_noise is None else ones * v_noise**2
         if x is None:
             return Velocity(frequency, ones, of_v, power, of_v, 1)
-        short = (1 - gain) ** 2 * np.maximum(averaged(measured, step, WIDTH) - of_v, 0.0)
-        usual = averaged(by_x, step, WIDTH) + short
+        short = (1 - gain) ** 2 * np.maximum(averaged(measured, WIDTH) - of_v, 0.0)
+        usual = averaged(by_x, WIDTH) + short
         derived = fourth_order_difference(x, step)
-        apart = averaged(spectrum(v - derived), step, WIDTH)
+        apart = averaged(spectrum(v - derived), WIDTH)
         differ = (apart > SURE * usual) | (SURE * apart < usual)
         of_v = np.maximum(of_v, np.where(differ, np.abs(apart - usual), 0.0))
         by_x = by_x + short
         both = by_x + of_v
         best = np.divide(by_x, both, out=np.ones(both.size), where=both > 0)
-        weight = averaged(best, step, WIDTH)  # narrow bands ring at ends of the record and jumps
+        weight = averaged(best, WIDTH)  # narrow bands ring at ends of the record and jumps
         noise = weight**2 * of_v + (1 - weight) ** 2 * by_x
         found = Velocity(frequency, weight, noise, measured, noise, 1)
         mixed = spectrum(found.mixed(derived, v), line=True)

@@ -8,7 +8,7 @@ Source: Gautier, Janot and Vandanjon, IEEE Trans. Control Syst. Technol. 21(2), 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from math import ceil, floor, log2, log10
+from math import ceil, log2
 from typing import Any, final
 
 import numpy as np
@@ -29,8 +29,8 @@ LOST = 0.01
 """Largest share of noise in the acceleration of the used band."""
 DIFFERENCE = (1.0, -2.0, 1.0)
 """Coefficients of the second difference."""
-FEW = 9
-"""Least number of neighbours for the mean of a spectrum in which motion is separated from noise."""
+FEW, WIDE = 9, 1e-3
+"""Least number and share of entries for the mean of a spectrum, to separate motion from noise."""
 
 
 @final
@@ -326,16 +326,12 @@ def rounded_level(signal: Array, power: Array) -> float:
     return max(noise_level(power), count_of(signal) ** 2 / 12)
 
 
-def averaged(power: Array, step: float, least: int = FEW) -> Array:
-    """Return a spectrum averaged over 1 Hz or `least` neighbours, whichever is wider."""
-    window = np.hanning(_width(power, step, least) + 2)[1:-1]
+def averaged(power: Array, least: int = FEW) -> Array:
+    """Return a spectrum averaged over its share `WIDE` or `least` neighbours, the wider one."""
+    width = min(max(least, 2 * round(WIDE * (power.size - 1)) + 1), power.size)
+    window = np.hanning(width + 2)[1:-1]
     count = np.convolve(np.ones(power.size), window, mode="same")
     return np.convolve(power, window, mode="same") / count
-
-
-def _width(power: Array, step: float, least: int) -> int:
-    """Return the number of entries of a spectrum in 1 Hz, at least `least` and at most all."""
-    return min(max(least, 2 * round((power.size - 1) * step) + 1), power.size)
 
 
 def position_band(x: Array, step: float) -> float:
@@ -349,7 +345,7 @@ def position_band(x: Array, step: float) -> float:
 
 
 def band_above(power: Array, noise: Array, step: float, order: int) -> float:
-    """Return the highest frequency [Hz] at which the 1 Hz mean exceeds `ABOVE` times the noise.
+    """Return the highest frequency [Hz] at which the mean exceeds `ABOVE` times the noise.
 
     The noise of the acceleration, derivative number `order`, up to this frequency is at most the
     share `LOST` of its motion. Isolated lines far above the motion, such as those of a coarse
@@ -358,7 +354,7 @@ def band_above(power: Array, noise: Array, step: float, order: int) -> float:
     frequency = np.linspace(0.0, 0.5 / step, power.size)
     weight = np.arange(power.size) ** (2.0 * order)
     lost = np.cumsum(weight * noise) > LOST * np.cumsum(weight * np.maximum(power - noise, 0.0))
-    known = np.flatnonzero((averaged(power, step) > ABOVE * noise) & ~lost)
+    known = np.flatnonzero((averaged(power) > ABOVE * noise) & ~lost)
     return float(frequency[max(1, known[-1])] if known.size else frequency[1])
 
 
@@ -367,17 +363,15 @@ def choose_filter(force: Array, step: float, bands: Sequence[float], rows: int =
 
         cut-off max(5 f_b, f_a) (at most Nyquist / 2),   decimation 0.8 Nyquist / (2 f_b)
 
-    f_b is rounded to one digit. The factors are those of the EMPS reference, which sets f_b = 20 Hz
-    by hand. f_a is the median of `bands`, the significant bandwidths of the coordinates. It limits
-    f_b and the cut-off of the decimation, 0.9 Nyquist / decimation, because noise in the
-    acceleration lowers the mass. Lower cut-offs spread the jumps of the force at reversals. At
-    least `rows` equations remain, if possible.
+    The factors are those of the EMPS reference, which sets f_b = 20 Hz by hand. f_a is the median
+    of `bands`, the significant bandwidths of the coordinates. It limits f_b and the cut-off of the
+    decimation, 0.9 Nyquist / decimation, because noise in the acceleration lowers the mass. Lower
+    cut-offs spread the jumps of the force at reversals. At least `rows` equations remain, if
+    possible.
     """
     nyquist = 0.5 / step
     known = float(np.median(bands))
-    found = max(min(bandwidth(force, step), known), 1 / (force.size * step))
-    digit = 10.0 ** floor(log10(found))
-    f_b = round(found / digit) * digit
+    f_b = max(min(bandwidth(force, step), known), 1 / (force.size * step))
     wanted = max(round(0.4 * nyquist / f_b), round(PASS * nyquist / known))
     decimation = min(wanted, force.size // (rows + 4 * LOBES))
     return Filter(min(max(5 * f_b, known), 0.5 * nyquist), max(1, decimation))

@@ -57,22 +57,65 @@ class Channel:
     motion_noise: float = 0.0
 
 
+class Bias(NamedTuple):
+    """Squares of the residuals of each channel by the noise of their regressors.
+
+    Attributes:
+        squares: expected sum of squares, shape (channels,).
+        slopes: half its derivatives by the first values, shape (channels, k).
+        usual: the squares at the start of a fit, shape (channels,).
+    """
+
+    squares: Array
+    slopes: Array
+    usual: Array
+
+
 class Evaluation(NamedTuple):
-    """Residuals r = predicted - measured in SI units (rows,), and dr/dvalues J (rows, values)."""
+    """Residuals r = predicted - measured in SI units (rows,), and dr/dvalues J (rows, values).
+
+    The cost of a row is r^2 + excess.
+    """
 
     r: Array
     J: Array
+    excess: Array | float = 0.0
+
+    def corrected(self, channels: Sequence[Channel], bias: Bias) -> "Evaluation":
+        """Return residuals r - d with d = J (J'J)^-1 c for the slopes c of the bias B.
+
+        Their cost |r|^2 - B has the gradient 2 J'(r - d). The usual B is added, so that the cost
+        is positive.
+        """
+        d, excess = np.zeros_like(self.r), np.zeros_like(self.r)
+        for k, channel in enumerate(channels):
+            rows, c = channel.rows, np.zeros(self.J.shape[1])
+            c[: bias.slopes.shape[1]] = bias.slopes[k]
+            d[rows] = shifted_by(self.J[rows], c)
+            excess[rows.start] = bias.usual[k] - bias.squares[k]
+        return Evaluation(self.r - d, self.J, excess + d * (2 * self.r - d))
 
 
 RANK = 1e-9
-"""Smallest nonzero singular value of sensitivities, relative to the largest."""
+"""Smallest nonzero singular value of scaled sensitivities, relative to the largest."""
 
 
 def shifted_by(J: Array, c: Array) -> Array:
     """Return J (J'J)^-1 c, by which residuals change if J'r changes by c, shape (rows,)."""
-    _, s, Vt = np.linalg.svd(np.linalg.qr(J, mode="r"))
+    size = np.sqrt(np.sum(J * J, axis=0))
+    size[size == 0.0] = 1.0
+    _, s, Vt = np.linalg.svd(np.linalg.qr(J / size, mode="r"))
     axes = Vt[s > RANK * s.max(initial=1e-300)]
-    return J @ (axes.T @ (axes @ c / s[: len(axes)] ** 2))
+    return J @ (axes.T @ (axes @ (c / size) / s[: len(axes)] ** 2) / size)
+
+
+def unbiased(residuals: Any, values: Array) -> Evaluation | str:
+    """Return the residuals at `values` without their bias, or a message on failure."""
+    found: Evaluation | str = residuals.at(values)
+    if isinstance(found, str) or not hasattr(residuals, "bias"):
+        return found
+    bias = residuals.bias(values)
+    return found if bias is None else found.corrected(residuals.channels, bias)
 
 
 class Residuals(Protocol):
@@ -133,10 +176,10 @@ class Blocks:
         """
         return None
 
-    def motion_noise(self, values: Array) -> Array:
-        """Return the rms of the residuals by the noise of the measured motion, per channel."""
+    def bias(self, values: Array) -> Bias | None:
+        """Return the squares of the residuals by the noise of the measured motion."""
         del values
-        return np.zeros(len(self.channels))
+        return None
 
     @abstractmethod
     def blocks(self, p: Array, own: Array) -> Iterator[tuple[Array, Array] | str]:
@@ -158,7 +201,7 @@ class Blocks:
             if isinstance(found, str):
                 return found
             self._known.append((values, found))
-        there, (r, J) = self._known[0]
+        there, (r, J, _) = self._known[0]
         return Evaluation(r + np.einsum("ij,j->i", J, values - there), J)
 
     @cached_property
@@ -213,9 +256,9 @@ class Extended:
         """True if the residuals are linear in all values."""
         return getattr(self.residuals, "linear", False)
 
-    def motion_noise(self, values: Array) -> Array:
-        """Return the rms of the residuals by the noise of the measured motion, per channel."""
-        return self.residuals.motion_noise(values)
+    def bias(self, values: Array) -> Bias | None:
+        """Return the squares of the residuals by the noise of the measured motion."""
+        return self.residuals.bias(values[: len(self.residuals.names)])
 
     def at(self, values: Array) -> Evaluation | str:
         """Return residuals and derivatives, or a message."""

@@ -21,8 +21,8 @@ from identification.residuals.balance import (
     coordinates,
     measure,
 )
-from identification.residuals.evaluation import DEAD_TIME, Array, Blocks, Channel, shifted_by
-from identification.residuals.sampled import RecordRows, Sampled, preload, same, scaled
+from identification.residuals.evaluation import DEAD_TIME, Array, Bias, Blocks, Channel
+from identification.residuals.sampled import Sampled, preload, same, scaled
 from identification.unknowns.roles import width_of
 from identification.unknowns.spec import Unknown
 from identification.unknowns.subject import Subject
@@ -64,8 +64,7 @@ class InverseDynamics:
         filter: cut-off and decimation of all records; None: from force and motion of each record.
         dead_time: bounds of the time [s] by which the measured force leads the acting force, an
             additional unknown of each record; it is negative for a force recorded late. (0, T)
-            permits both, -T to T. "auto": estimated by `Fit` if the data determine it. None: no
-            dead time.
+            permits both, -T to T. "auto": estimated if the data determine it. None: no dead time.
         noise: channel of a position or velocity -> standard deviation of its white noise; others
             are those of the spectrum and of rounding. `Fit(noise=...)` passes such entries.
 
@@ -119,15 +118,13 @@ class InverseDynamics:
             ValueError: an implicit model, missing channels, unequal intervals, records too short
                 for the filter, or law states that only a simulation can follow.
         """
-        del start
         model = subject.model
         where = f"{WHERE}: model '{model.name}'"
         found = coordinates(model, where)
         called = {"x": self.x, "force": self.force} if subject.drive is not None else {}
         if subject.drive is not None and self.v is not None:
             called["v"] = self.v
-        noise = self.noise or {}
-        motions = [measure(model, found, record, called, self.filter, noise) for record in data]
+        motions = [measure(model, found, r, called, self.filter, self.noise or {}) for r in data]
         seen = [motion.w[:, :: 1 + motion.t.size // LONG] for motion in motions]
         made = balance(model, subject.names, found, np.hstack(seen), where)
         p = np.array([float(v.start) for v in model.p if v.name in subject.names])
@@ -140,7 +137,8 @@ class InverseDynamics:
         pieces = tuple(_piece(made, motion, model, p, self.filter is None) for motion in motions)
         first = subject.names, tuple(own), tuple(_channels(made.rows, pieces))
         more = made.equations, made.rows, pieces, made.slopes, len(made.preloads), made.loaded
-        rows = InverseRows(*first, *more)
+        usual = np.array([(start or {}).get(n, x) for n, x in zip(subject.names, p, strict=True)])
+        rows = InverseRows(*first, *more, usual)
         return rows.delayed(*self.dead_time) if isinstance(self.dead_time, tuple) else rows
 
 
@@ -300,9 +298,9 @@ class InverseRows(Blocks):
     The noise e of rates and accelerations enters residuals r and sensitivities J. Their product is
     biased by c = E[dJ' dr], which lowers the mass. The residuals are therefore corrected,
 
-        r - J (J'J)^-1 c,   c = 1/2 d/dp sum_i |G_i S|^2,   G = dr/d(v, a),   S from spectra
+        r - J (J'J)^-1 c,   c = 1/2 dB/dp,   B = sum_i |G_i S|^2,   G = dr/d(v, a),   S from spectra
 
-    so that the gradient of their squares has mean zero at the true values (corrected score).
+    and the cost is |r|^2 - B, whose gradient has mean zero at the true values (corrected score).
     Source: Stefanski, Commun. Stat. Theory Methods 18(12), 1989; Nakamura, Biometrika 77(1), 1990.
     """
 
@@ -312,6 +310,7 @@ class InverseRows(Blocks):
     slopes: Sampled | None
     preloads: int
     loaded: bool
+    start: Array
 
     def delayed(self, low: float, high: float) -> "InverseRows":
         """Return the residuals with a dead time of each record within bounds.
@@ -377,24 +376,25 @@ class InverseRows(Blocks):
                 if late.size and row.input is not None:
                     J[:, p.size + shares.size + number] = rates[row.input]
                 both = part.equations(k, np.column_stack([path.rows[:, k], J]))
-                yield both[:, 0] - self._bias(part, k, p, both[:, 1:]), both[:, 1:]
+                yield both[:, 0], both[:, 1:]
 
-    def motion_noise(self, values: Array) -> Array:
-        """Return the rms of the residuals by the noise of the measured motion, per channel."""
-        p, count = values[: len(self.parameters)], range(len(self.rows))
-        each = (self._noisy(part, k, p) for part in self.pieces for k in count)
-        return np.array([0.0 if e is None else float(np.linalg.norm(e.rows)) for e in each])
+    def bias(self, values: Array) -> Bias:
+        """Return the squares of the residuals by the noise of the measured motion."""
+        return Bias(*self._noise(values[: len(self.parameters)]), self._usual)
 
-    def _noisy(self, part: Piece, k: int, p: Array) -> RecordRows | None:
-        """Return G S of row k, divided by the root of the number of equations, and derivatives."""
-        motion, here = part.motion, part.decimation.centres
-        at = some(here(np.arange(motion.t.size)[motion.inside])[part.kept[k]])
-        return scaled(self.slopes, motion.w[:, at], motion.step, p, k, part.errors)
+    @cached_property
+    def _usual(self) -> Array:
+        return self._noise(self.start)[0]
 
-    def _bias(self, part: Piece, k: int, p: Array, J: Array) -> Array:
-        """Return J (J'J)^-1 c for row k of a record, shape (rows,)."""
-        found = self._noisy(part, k, p) if p.size else None
-        if found is None:
-            return np.zeros(len(J))
-        c = np.einsum("ij,ijp->p", *found) * part.kept[k].size
-        return shifted_by(J, np.append(c, np.zeros(J.shape[1] - p.size)))
+    def _noise(self, p: Array) -> tuple[Array, Array]:
+        """Return |G S|^2 of each channel, and half its derivatives by p."""
+        squares, slopes = np.zeros(len(self.channels)), np.zeros((len(self.channels), p.size))
+        for i, c in enumerate(self.channels if p.size else ()):
+            part, k = self.pieces[c.record], i % len(self.rows)
+            motion, here = part.motion, part.decimation.centres
+            at = some(here(np.arange(motion.t.size)[motion.inside])[part.kept[k]])
+            found = scaled(self.slopes, motion.w[:, at], motion.step, p, k, part.errors)
+            if found is not None:
+                squares[i] = c.t.size * float(np.sum(found.rows**2))
+                slopes[i] = c.t.size * np.einsum("ij,ijp->p", *found)
+        return squares, slopes

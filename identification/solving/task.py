@@ -25,11 +25,13 @@ import numpy as np
 from identification.residuals.evaluation import (
     THRESHOLD,
     Array,
+    Bias,
     Channel,
     Evaluation,
     Residuals,
     influence,
     shaped,
+    unbiased,
 )
 from identification.unknowns.spec import Unknown
 from identification.unknowns.unknowns import Unknowns
@@ -74,11 +76,12 @@ class Triangles:
     own: tuple[Unknown, ...]
     channels: tuple[Channel, ...]
     R: Array
+    bias: Callable[[Array], Bias | None] | None
 
     @classmethod
     def of(cls, residuals: Residuals, values: Array) -> "Triangles | str":
         """Return the triangles of linear residuals evaluated at `values`, or a message."""
-        found, k = residuals.at(values), values.size
+        found, k, bias = residuals.at(values), values.size, getattr(residuals, "bias", None)
         if isinstance(found, str):
             return found
         whole = np.column_stack([found.J, found.r - np.einsum("ij,j->i", found.J, values)])
@@ -87,7 +90,7 @@ class Triangles:
             replace(c, rows=slice(i * (k + 1), (i + 1) * (k + 1)), ordered=False)
             for i, c in enumerate(residuals.channels)
         )
-        return cls(residuals.names, residuals.own, channels, np.vstack(R))
+        return cls(residuals.names, residuals.own, channels, np.vstack(R), bias)
 
     def at(self, values: Array) -> Evaluation:
         """Return residuals and derivatives."""
@@ -143,12 +146,18 @@ class Point:
         e, de = shaped(self.r, self.loss)
         J = self.evaluation.J * (de / self.sigma)[:, None]
         R = triangle(np.column_stack([J, e]))
+        R[-1, -1] = np.sqrt(max(R[-1, -1] ** 2 + self.excess, 0.0))
         return R[:, -1], np.einsum("ik,kj->ij", R[:, :-1], self.slope)
 
     @cached_property
     def cost(self) -> float:
-        """Sum of the losses; r'r for squares."""
-        return square(shaped(self.r, self.loss)[0])
+        """Sum of the losses; r'r for squares, with the excess of each channel."""
+        return square(shaped(self.r, self.loss)[0]) + self.excess
+
+    @property
+    def excess(self) -> float:
+        """Sum of the excess of the rows, for squares."""
+        return float(np.sum(self.evaluation.excess / self.sigma**2)) * (self.loss == "squares")
 
 
 @final
@@ -213,8 +222,7 @@ class Task:
     def at(self, w: Array) -> Point | str:
         """Return the point at `w`, or a message on failure."""
         w = np.array(w, float)
-        values = self.unknowns.values(w)
-        names = self.unknowns.names
+        values, names = self.unknowns.values(w), self.unknowns.names
         if not np.isfinite(values).all():
             return f"with {_shown(names, values)}: a value is not finite"
         if self.guard is not None:
@@ -224,7 +232,7 @@ class Task:
                 self.guard({name: value for name, value in given if name not in own})
             except ValueError as error:
                 return f"with {_shown(names, values)}: {error}"
-        found = self.residuals.at(values)
+        found = unbiased(self.residuals, values)
         if isinstance(found, str):
             return found
         if not (np.isfinite(found.r).all() and np.isfinite(found.J).all()):
@@ -306,7 +314,7 @@ def variance(task: Task, point: Point) -> float:
     least = 1.0
     if set(task.noise) == set(task.estimated):
         least = max((NOISELESS * task.spread(s) / task.noise[s]) ** 2 for s in task.noise)
-    return max(least, point.cost / freedom)
+    return max(least, (point.cost - point.excess) / freedom)
 
 
 def remaining(task: Task, point: Point) -> float:

@@ -18,7 +18,7 @@ from identification.starts.stribeck import (
     fit_curve,
     fit_law,
 )
-from identification.unknowns.roles import Natural, orders, parts, velocity
+from identification.unknowns.roles import Natural, orders, parts, velocity, viscous_force
 from identification.unknowns.subject import Subject
 from symfric.foundation import checks
 from symfric.foundation.parameters import Parameter, parameters
@@ -176,7 +176,7 @@ def _mass(measured: Measured) -> float:
 
 def _guess(parameter: Parameter, facts: Facts, law: Law) -> float:
     """Return the start of a parameter by its role and unit; its present value if undetermined."""
-    value, unit = float(parameter.value), parameter.unit
+    value, unit, fastest = float(parameter.value), parameter.unit, facts.friction.fastest
     parted = shared(parameter, law)
     match parameter.role:
         case "mass" if facts.m > 0:
@@ -185,10 +185,8 @@ def _guess(parameter: Parameter, facts: Facts, law: Law) -> float:
             return facts.offset
         case "level":
             return _level(parameter, facts, law) / parted
-        case "viscous" if unit in ("N s/m", "N m s/rad"):
-            return facts.stribeck.sigma_2
-        case "viscous" if unit in ("s/m", "s/rad"):
-            return facts.stribeck.sigma_2 / facts.N
+        case "viscous" if (force := viscous_force(law, parameter.name, fastest, facts.N)) > 0:
+            return facts.stribeck.sigma_2 * fastest / force
         case "velocity scale" if parameter.lower >= 0:
             return velocity(parameter, facts.stribeck.v_s)
         case "stiffness" if (stiffness := _stiffness(facts, law)) > 0:

@@ -7,7 +7,7 @@ that the result of a fit does not depend on the units of force, length and time.
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
-from math import floor, isfinite, log10, prod
+from math import isfinite, prod
 from re import sub
 from typing import NamedTuple, TypeVar, final
 
@@ -25,6 +25,7 @@ from symfric.foundation.parameters import (
 from symfric.foundation.units import parsed
 from symfric.foundation.variable import POSITIVE
 from symfric.laws import Asymmetric, Law
+from symfric.laws.composed.populations import steady_force
 
 Array = NDArray[np.float64]
 
@@ -48,6 +49,8 @@ ALIKE = 1e-7
 """Share of a parameter's effect on the force below which the other parameters reproduce it."""
 WIDTH, BLEND = 1e-3, 1e-4
 """Smoothing widths of jumps and of narrower blends, relative to the largest speed in the data."""
+LARGE = 1e60
+"""Viscous coefficient whose force exceeds all others."""
 SMALL = 0.1
 """Smoothing width relative to the smallest speed, for points at low speeds."""
 SLOWEST, NARROWEST = 2e-3, 1e-5
@@ -173,25 +176,34 @@ def reason(parameter: Parameter, *, directions: bool, bristle: bool | None, mach
     return REASONS.get(parameter.role, f"{parameter.role}, fitted only on request")
 
 
+def viscous_force(law: Law, name: str, speed: float, load: float) -> float:
+    """Return the force [N] of a large viscous coefficient relative to it; 0 if it has bounds."""
+    known = parameters(law)
+    if name not in known or known[name].upper < 2 * LARGE:
+        return 0.0
+    laws = (with_values(law, {name: x}) for x in (LARGE, 2 * LARGE))
+    low, high = (steady_force(one, speed * np.array([-1.0, 1.0]), load) for one in laws)
+    return float(np.abs(high - low).max()) / LARGE
+
+
 def has_directions(obj: Parametric) -> bool:
     """Return True if a law in `obj` distinguishes the two directions."""
     return any(isinstance(part, Asymmetric) for part in parts(obj))
 
 
-def held_value(parameter: Parameter, speeds: Speeds) -> float:
-    """Return the value of a held parameter; smoothing widths set by the user are unchanged."""
+def held_value(parameter: Parameter, speeds: Speeds, size: float) -> float:
+    """Return the value of a held parameter; smoothing widths set by the user are unchanged.
+
+    Defaults of other widths are numbers in their natural unit `size`.
+    """
     value = float(parameter.value)
-    if parameter.role != "width" or parameter.unit not in VELOCITIES:
+    if parameter.role != "width" or value != parameter.default:
         return value
-    if value != parameter.default or not speeds.known:
+    if parameter.unit not in VELOCITIES:
+        return value * size
+    if not speeds.known:
         return value
-    return one_digit(speeds.share(BLEND if parameter.field == "v_blend" else WIDTH, SMALL))
-
-
-def one_digit(value: float) -> float:
-    """Return the positive number `value` rounded to one significant digit."""
-    digits = -floor(log10(value))
-    return round(value, digits)
+    return speeds.share(BLEND if parameter.field == "v_blend" else WIDTH, SMALL)
 
 
 def inseparable(
@@ -277,8 +289,8 @@ P = TypeVar("P", bound=Parametric)
 
 PER_LOAD = ("level", "viscous", "stiffness", "damping")
 """Roles of parameters that multiply the normal force if their unit contains no force."""
-SLIDING = (("N m", "N"), ("kg m^2", "kg"), ("rad", "m"))
-"""Units of rotation and the corresponding units of sliding."""
+SLIDING = (("N m", "N"), ("kg m^2", "kg"), ("rad", "m"), ("Pa", "N m^-2"))
+"""Units of rotation and pressure, and the corresponding units of sliding."""
 
 
 @final
@@ -297,7 +309,7 @@ class Natural:
         powers = _powers(text)
         if parameter.unit == "rad" and parameter.role == "geometry":  # an angle, not a path
             return 1.0
-        if parameter.role == "load":
+        if parameter.role == "load" or parameter.field.startswith("N_"):
             return self.load ** powers.get("N", 0.0)
         shared = parameter.role in PER_LOAD and not {"N", "kg"} & powers.keys()
         return self.of_unit(text) * (self.force / self.load if shared else 1.0)
@@ -307,6 +319,15 @@ class Natural:
         units = {"N": self.force, "m": self.length, "s": self.time}
         units["kg"] = self.force * self.time**2 / self.length
         return prod(units.get(symbol, 1.0) ** power for symbol, power in _powers(unit).items())
+
+    def viscous(
+        self, law: Law, names: Sequence[str], speed: float, load: float
+    ) -> dict[str, float]:
+        """Return the values of viscous coefficients at which their force is the natural one."""
+        known = parameters(law)
+        mine = [n for n in names if n in known and known[n].role == "viscous"]
+        each = {n: viscous_force(law, n, speed, load) for n in mine}
+        return {n: self.force / force for n, force in each.items() if force > 0}
 
     def sizes(self, whole: Parametric) -> dict[str, float]:
         """Return the natural units of all parameters; 1 if bounds of `whole` are in SI units."""

@@ -194,12 +194,20 @@ def _of_parts(
     }
     small = natural.rescaled(whole, defaults=True) if natural != roles.Natural() else whole
     reasons = _reasons(small, requests, load / natural.load, moving)
-    given = requests.fixed
-    held = {n: given.get(n, roles.held_value(known[n], speeds)) for n in reasons}
-    sizes, free = natural.sizes(whole), [n for n in known if n not in reasons]
-    drafts = [of_parameter(known[n], units[n], speeds, sizes[n]) for n in free]
-    free = drafted(drafts, requests, held, roles.orders(whole))
-    whole = with_values(whole, held | {n: u.start for n, u in free.items()})
+    given, sizes = requests.fixed, natural.sizes(whole)
+    held = {n: given.get(n, roles.held_value(known[n], speeds, sizes[n])) for n in reasons}
+    names, default = [n for n in known if n not in reasons], whole
+
+    def started() -> tuple[Scene | Law, dict[str, Unknown]]:
+        drafts = [of_parameter(known[n], units[n], speeds, sizes[n]) for n in names]
+        free = drafted(drafts, requests, held, roles.orders(default))
+        return with_values(default, held | {n: u.start for n, u in free.items()}), free
+
+    whole, free = started()
+    if natural != roles.Natural():  # held values determine the forces of viscous coefficients
+        law = whole if isinstance(whole, Law) else whole.law
+        sizes |= natural.viscous(law, names, speeds.largest, load)
+        whole, free = started()
     symbolic, p = symbolise(whole, *free)
     law, scene = (whole, None) if isinstance(whole, Law) else (whole.law, whole)
     model = points_model(symbolic, load, p) if isinstance(symbolic, Law) else symbolic.equations(p)

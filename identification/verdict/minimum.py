@@ -13,7 +13,14 @@ from typing import NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.residuals.evaluation import Array, Blocks, Channel, Extended, influence
+from identification.residuals.evaluation import (
+    Array,
+    Blocks,
+    Channel,
+    Extended,
+    influence,
+    unbiased,
+)
 from identification.solving.task import Point, Task
 from identification.unknowns.spec import Unknown
 from identification.verdict.colour import Colour, colour, places, positions
@@ -259,9 +266,10 @@ def minimum(task: Task, point: Point) -> Minimum:
     raw = point.evaluation.r
     change = partial(_change, task, raw)
     channels, residuals = task.channels, task.residuals
-    if isinstance(residuals, Blocks | Extended):
-        each = zip(channels, residuals.motion_noise(point.values).tolist(), strict=True)
-        channels = [replace(channel, motion_noise=level) for channel, level in each]
+    bias = residuals.bias(point.values) if isinstance(residuals, Blocks | Extended) else None
+    if bias is not None:
+        each = zip(channels, bias.squares.tolist(), strict=True)
+        channels = [replace(c, motion_noise=(x / max(c.t.size, 1)) ** 0.5) for c, x in each]
     return Minimum(
         channels, box.unknowns, box.names, point.values, point.slope, box.at_bound(point.w),
         point.weights * point.r, point.J, gain, raw, known, change,
@@ -270,7 +278,7 @@ def minimum(task: Task, point: Point) -> Minimum:
 
 def _change(task: Task, raw: Array, values: Array) -> float:
     """Return the norm of the change of the weighted residuals from `raw` to other values."""
-    there = task.residuals.at(values)
+    there = unbiased(task.residuals, values)
     if isinstance(there, str):
         return np.inf
     return float(np.linalg.norm((there.r - raw) / task.sigma))

@@ -171,7 +171,7 @@ class Walk:
         step = float(t * error) if isfinite(error) and error > 0 else BLIND * size
         self.step = min(step / self.best, 1.0) if self.logarithmic else step
         freedom = max(point.r.size - box.lower.size, 1)
-        self.scale = max(point.cost / freedom, 1e-300) * colour
+        self.scale = max((point.cost - point.excess) / freedom, 1e-300) * colour
         self.limit = t**2
 
     def far(self, decades: float) -> list[float]:

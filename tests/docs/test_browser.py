@@ -55,9 +55,7 @@ def write(folder: Path, name: str, body: str) -> None:
 
 @needs_browser
 @pytest.mark.heavy
-def test_problems_of_pages_are_found_and_good_pages_pass(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_problems_of_pages_are_found(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "x.png").write_bytes(PNG)
     for k, body in enumerate(WRONG):
         write(tmp_path, str(k), body)
@@ -70,7 +68,13 @@ def test_problems_of_pages_are_found_and_good_pages_pass(
             assert any(f" {k}.html" in line and sentence in line for line in found), sentence
     for sentence in ("hardly a word", "which language", "no title", "no main part", "0 headings"):
         assert any("bare.html" in line and sentence in line for line in found), sentence
+
+
+@needs_browser
+@pytest.mark.slow
+def test_good_pages_pass(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write(tmp_path, "good", "<math><mi>x</mi></math>")
+    write(tmp_path, "other", "")
     shots = tmp_path / "shots"
     assert main(tmp_path, shots, ["goo"]) == 0
     assert {p.parent.name for p in shots.rglob("good.png")} == {k.replace(" ", "_") for k in KINDS}

@@ -43,7 +43,8 @@ def test_points_give_the_curve_back_within_their_noise() -> None:
         assert abs(found.value - value) < 4 * found.standard_error
     assert fit.noise["F"] == pytest.approx(NOISE, rel=0.2)
     assert isinstance(fit.law, Stribeck) and fit.law.mu_s >= fit.law.mu_d
-    assert fit.parameters["v_eps"].value <= 1e-5  # points at low speeds narrow the smoothing
+    slowest = np.quantile(np.abs(points()[0]["v"]), 0.01)  # narrows the smoothing
+    assert fit.parameters["v_eps"].value == pytest.approx(0.1 * slowest, rel=1e-12)
 
 
 def test_the_band_of_a_linear_law_is_that_of_the_regression() -> None:
@@ -174,7 +175,7 @@ print(" ".join(s.hex() for s in fit.noise.values()), fit.evaluations)
 """
 
 
-@pytest.mark.heavy
+@pytest.mark.slow
 def test_processes_side_by_side_agree_to_the_bit(capsys: pytest.CaptureFixture[str]) -> None:
     """Whatever the number of threads of BLAS, which divides sums of more than 10 000 rows only."""
     exec(SCRIPT)

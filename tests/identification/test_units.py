@@ -19,6 +19,7 @@ from identification import (
     synthetic_drive_data,
 )
 from identification.data.record import Record
+from identification.solving.task import Point
 from symfric import ALL_LAWS
 from symfric.foundation.parameters import parameters
 from symfric.scenes import Drive
@@ -68,19 +69,25 @@ def in_units(data: Dataset, sizes: Sizes) -> Dataset:
     return data.each(changed)
 
 
+def restated(fit: Fit, held: Mapping[str, float], sizes: Sizes) -> tuple[Fit, dict[str, float]]:
+    """Return a fit of a law in other units with values that it holds, and the units of values."""
+    known = parameters(Drive(ALL_LAWS[fit.what]()))
+    numbers = {n: float(p.value) for n, p in known.items() if len(n) == 1 and p.unit == "1"}
+    unit = {n: size(p.unit, sizes, numbers) for n, p in known.items() if p.unit != "rad"}
+    kept = [n for n in held if n != "N" and known[n].role != "width"]
+    fixed = {n: unit.get(n, 1.0) * held[n] for n in kept}
+    data = in_units(fit.data, sizes)
+    return replace(fit, data=data, fixed=fixed, normal_force=sizes[0]), unit
+
+
 def assert_same(kind: Any, law: str, data: Dataset, some: list[Sizes], **given: Any) -> None:
     """Fit in every system of units, and compare values and intervals with those in SI units."""
-    known = parameters(Drive(ALL_LAWS[law]()))
-    numbers = {n: float(p.value) for n, p in known.items() if len(n) == 1 and p.unit == "1"}
-    first: Fitted = Fit(kind, law, data, **given).solve(throw=False)
-    held = [n for n, p in first.parameters.items() if p.fixed and n != "N"]
-    held = [n for n in held if known[n].role != "width" or known[n].unit == "N"]
+    asked = Fit(kind, law, data, **given)
+    first: Fitted = asked.solve(throw=False)
+    held = {n: p.value for n, p in first.parameters.items() if p.fixed}
     for sizes in some:
-        unit = {n: size(p.unit, sizes, numbers) for n, p in known.items() if p.unit != "rad"}
-        fixed = {n: unit.get(n, 1.0) * first.parameters[n].value for n in held}
-        other = Fit(
-            kind, law, in_units(data, sizes), fixed=fixed, normal_force=sizes[0], **given
-        ).solve(throw=False)
+        again, unit = restated(asked, held, sizes)
+        other = again.solve(throw=False)
         assert other.status is first.status, (law, sizes, other.message)
         for name, p in first.parameters.items():
             q, one = other.parameters[name], unit.get(name)
@@ -93,12 +100,15 @@ def assert_same(kind: Any, law: str, data: Dataset, some: list[Sizes], **given: 
 
 
 def test_units_of_points_do_not_matter() -> None:
-    for law in ("stribeck", "hollars"):
-        assert_same(Points(), law, of_law(law, False), UNITS[::2], starts=1)
+    for law, some in (
+        ("stribeck", UNITS[::2]),
+        ("hollars", UNITS[::2]),
+        ("mixed_lubrication", UNITS),
+    ):
+        assert_same(Points(), law, of_law(law, False), some, starts=1)
 
 
 def test_units_of_a_force_balance_do_not_matter() -> None:
-    """Of exact positions: the correction of their noise ends within 1 % of an interval."""
     slow: Any = {"rate": 500.0, "speeds": (0.004, 0.02, 0.08), "position_noise": 1e-10}
     some = [(1e-9, 1e7, 1.0), (1.0, 1.0, 1e9)]
     assert_same(InverseDynamics(), "stribeck", synthetic_drive_data(seed=1, **slow), some, starts=1)
@@ -121,12 +131,34 @@ def test_units_do_not_matter_for_any_law(name: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", [InverseDynamics(), Shooting(), ClosedLoop()], ids=str)
-@pytest.mark.parametrize("law", ["stribeck", "brown_mcphee", "lugre"])
+@pytest.mark.parametrize(
+    ("kind", "law"),
+    [
+        (InverseDynamics(), "stribeck"),
+        (InverseDynamics(), "brown_mcphee"),
+        (InverseDynamics(), "lugre"),
+        (ClosedLoop(), "stribeck"),
+        (ClosedLoop(), "brown_mcphee"),
+    ],
+)
 def test_units_do_not_matter_for_any_residuals(kind: Any, law: str) -> None:
-    if law == "lugre" and not isinstance(kind, InverseDynamics):
-        law = "dahl"  # fewer states that only a simulation follows
-    if law == "dahl" and isinstance(kind, ClosedLoop):
-        pytest.skip("the sampled loop has no law with states")
     data = synthetic_drive_data(seed=1).between(0.0, 4.0)
     assert_same(kind, law, data, UNITS, starts=1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("law", ["stribeck", "dahl"])
+def test_units_do_not_matter_for_simulated_residuals(law: str) -> None:
+    """At the start: a search in one window of 4 s amplifies rounding and ends at its limit."""
+    data = synthetic_drive_data(seed=1).between(0.0, 4.0)
+    asked = Fit(Shooting(), law, data, starts=1)
+    made = asked.prepared()
+    first = made.task.at(made.centre)
+    assert isinstance(first, Point)
+    for sizes in UNITS:
+        again = restated(asked, made.subject.held, sizes)[0].prepared()
+        other = again.task.at(again.centre)
+        assert isinstance(other, Point)
+        assert other.cost == pytest.approx(first.cost, rel=1e-6)
+        for a, b in ((other.r, first.r), (other.J, first.J)):
+            np.testing.assert_allclose(a, b, rtol=0, atol=1e-6 * np.abs(b).max())

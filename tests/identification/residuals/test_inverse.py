@@ -10,8 +10,10 @@ from numpy.typing import NDArray
 
 from identification.data.dataset import Dataset
 from identification.data.filters import Filter
+from identification.fit import Fit
 from identification.residuals.balance import balance, coordinates
 from identification.residuals.inverse import ENOUGH, InverseDynamics, InverseRows
+from identification.solving.task import Point
 from identification.unknowns.subject import Subject, subject
 from symfric import LuGre, Stribeck, rabinowicz, simulate
 from symfric.foundation.parameters import with_values
@@ -259,4 +261,29 @@ def test_the_noise_of_the_motion_has_its_size_in_the_residuals() -> None:
         data = Dataset.of(t=clean.time, x=x, force=clean["force"])
         rows = plain(data)
         left = float(np.sqrt(np.mean(evaluated(rows, TRUE).r ** 2)))
-        assert rows.motion_noise(TRUE)[0] == pytest.approx(left, rel=0.15)
+        assert np.sqrt(rows.bias(TRUE).squares[0] / rows.channels[0].t.size) == pytest.approx(
+            left, rel=0.15
+        )
+
+
+@pytest.mark.parametrize("law", ["coulomb+viscous", "stribeck"])
+def test_the_cost_without_the_noise_of_the_motion_has_the_gradient_of_its_residuals(
+    law: str,
+) -> None:
+    noise = 3e-5 * np.random.default_rng(0).standard_normal(moved(DRIVE)[0].size)
+    record = moved(DRIVE)[0]
+    data = Dataset.of(t=record.time, x=record["x"] + noise, force=record["force"])
+    asked = Fit(InverseDynamics(), law, data).prepared()
+    task = asked.task.with_noise({"force": 0.5})
+    points = [task, task.reduced(asked.centre)]
+    for one in points:
+        here = one.at(asked.centre)
+        assert isinstance(here, Point) and here.excess != 0.0
+        f, J = here.reduced
+        assert f @ f == pytest.approx(here.cost, rel=1e-9)
+        for k, step in enumerate(1e-5 * np.eye(here.w.size)):
+            low, high = (one.at(here.w + side * step) for side in (-1, 1))
+            assert isinstance(low, Point) and isinstance(high, Point)
+            slope = (high.cost - low.cost) / 2e-5
+            assert 2 * here.J[:, k] @ here.r == pytest.approx(slope, rel=1e-5, abs=1e-6 * here.cost)
+            assert 2 * J[:, k] @ f == pytest.approx(slope, rel=1e-5, abs=1e-6 * here.cost)

@@ -42,7 +42,7 @@ CONTROLLERS = {
 }
 
 
-@pytest.mark.parametrize("name", sampled(CONTROLLERS, of=2))
+@pytest.mark.parametrize("name", sampled(CONTROLLERS, of=3))
 def test_float_is_verified_with_half_the_memory(name: str, tmp_path: Path) -> None:
     made = CONTROLLERS[name]()
     found = made.to_c(tmp_path, "float").verify()

@@ -80,12 +80,11 @@ def test_a_limit_cycle_of_a_millimetre_vanishes(name: str) -> None:
 
 @heavy
 def test_wrong_levels_compensate_less_and_excessive_ones_hunt() -> None:
-    """Levels of 50 %, 80 % and 120 % on bristles; 120 % on Coulomb friction hunts."""
-    cases = {f"{s:g}": {"scale_coulomb": s, "scale_stribeck": s} for s in (0.5, 0.8, 1.0, 1.2)}
+    """Levels of 50 % and 120 % on bristles; 120 % on Coulomb friction hunts."""
+    cases = {f"{s:g}": {"scale_coulomb": s, "scale_stribeck": s} for s in (0.5, 1.0, 1.2)}
     found = compared("bristles", sine(0.02, 0.5, 2.0), cases=cases, noise=3e-6)
-    half, less, right, more = (found.reduction(name) for name in cases)
-    assert 2.0 < half < less < right
-    assert min(less, more) > 5.0
+    half, right, more = (found.reduction(name) for name in cases)
+    assert 2.0 < half < right and more > 5.0
     found = compared("Coulomb", step(0.01, 8.0), cases={"too much": cases["1.2"]})
     assert found["too much"].hunting > 100 * SOFT.count
     assert "! too much: hunts at rest" in found.table()

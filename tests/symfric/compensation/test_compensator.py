@@ -113,7 +113,7 @@ def test_without_a_load_there_is_no_force_until_it_returns(law: sf.Law, terms) -
 
 
 @pytest.mark.heavy
-@pytest.mark.parametrize("name", sampled(CASES, of=6))
+@pytest.mark.parametrize("name", sampled(CASES, of=10))
 def test_the_terms_of_every_law_add_up_to_its_force(name: str) -> None:
     law = CASES[name]
     try:

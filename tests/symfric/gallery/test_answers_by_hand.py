@@ -138,6 +138,7 @@ def test_one_motion_has_several_s_and_the_order_needs_its_numbers() -> None:
     assert "2.20" in text
 
 
+@pytest.mark.slow
 def test_the_box_of_the_paper_moves_as_far() -> None:
     found = compare_with_paper("pendulum_box", ["Smooth"])
     (row,) = found.rows
