@@ -49,5 +49,5 @@ def test_a_block_that_coasts_to_rest_arrives_when_friction_stops_it() -> None:
     )  # fmt: skip
     found = solve(Problem(phase, integral(lambda s: 1.0)))
     arrival = 1 / (0.1 * 9.81)
-    assert found.verified and found.T == pytest.approx(arrival, rel=1e-7)
+    assert found.verified and found.cost == pytest.approx(arrival, rel=1e-7)
     assert [mode.kind for mode in found.modes["guide"]] == ["slip+"]
