@@ -124,24 +124,6 @@ def rest_slope(law: sf.SelfTuning, load: float = N) -> float:
     return float(law.force(1e-12, load)) / 1e-12
 
 
-def test_peak_is_the_static_level_and_the_asymptote_the_dynamic_one() -> None:
-    for ratio in RATIOS[1:]:
-        for B, E in ((1.0, -5.0), (200.0, 0.0), (1e4, 0.5)):
-            law = sf.SelfTuning(mu_s=0.4, mu_d=0.4 * ratio, B=B, E=E)
-            peak = np.max(law.force(np.geomspace(1e-3, 1e3, 40_001) / B, N))
-            assert 2.0 * (1 - 1e-6) <= peak <= 2.0
-            assert law.force(1e12 / B, N) == pytest.approx(2.0 * ratio, rel=1e-9)
-            assert rest_slope(law) == pytest.approx(2.0 * B * law.C, rel=1e-6)
-            brittle = sf.BrittleSelfTuning(mu_s=0.4, mu_d=0.4 * ratio, E=E)
-            for load in (1e-9, N, 1e4):
-                F = brittle.force(np.geomspace(1e-6, 1.0, 20_001), load)
-                assert np.max(F) == pytest.approx(0.4 * load, rel=1e-6)
-                assert brittle.force(1e12, load) == pytest.approx(0.4 * ratio * load, rel=1e-6)
-    F = sf.SelfTuning(mu_s=0.2, mu_d=0.2).force(np.geomspace(1e-6, 1e3, 1001), N)
-    assert (np.diff(F) > 0).all(), "equal levels have no peak"
-    assert F[-1] < 1.0
-
-
 def test_peak_and_slope_are_the_chosen_ones() -> None:
     for ratio in RATIOS:
         for v_p in (1e-5, 3e-3, 1.0):
@@ -173,12 +155,6 @@ def test_symbols_give_stiffnesses_except_of_a_curved_peak() -> None:
     law, (mu_d,) = sf.symbolise(sf.SelfTuning(mu_s=0.2, mu_d=0.1), "mu_d")
     slope = ca.Function("slope", [mu_d.symbol], [ca.gradient(law.C, mu_d.symbol)])
     assert float(slope(0.2)) == -inf, "where the levels meet"
-
-
-def test_shape_factor_has_known_values() -> None:
-    for rho, C in ((0.0, 2.0), (2 / 3, 1.5354), (0.8, 1.4097), (1.0, 1.0)):
-        assert shape_factor(rho) == pytest.approx(C, abs=5e-5)
-        assert pytest.approx(C, abs=5e-5) == sf.SelfTuning(mu_s=0.3, mu_d=0.3 * rho).C
 
 
 def test_brittleness_has_the_tabulated_values() -> None:
