@@ -4,6 +4,7 @@ from math import sqrt
 
 import numpy as np
 import pytest
+from tables import sampled
 
 from ocp import Free, Phase, Problem, integral, solve
 from symfric import BrownMcPhee, ExactCoulomb, Law, drive
@@ -14,13 +15,16 @@ MU, INERTIA, RADIUS = 0.35, 0.1, 0.15
 
 @pytest.mark.parametrize(
     ("law", "speed", "most"),
-    [
-        (ExactCoulomb(mu_s=0.5, mu_d=MU), 20.0, 500.0),
-        (ExactCoulomb(mu_s=MU, mu_d=MU), 20.0, 200.0),
-        pytest.param(ExactCoulomb(mu_s=MU, mu_d=MU), 20.0, 500.0, marks=pytest.mark.slow),
-        pytest.param(ExactCoulomb(mu_s=MU, mu_d=MU), 200.0, 500.0, marks=pytest.mark.slow),
-        pytest.param(BrownMcPhee(mu_s=MU, mu_d=MU, v_t=1e-3), 20.0, 500.0, marks=pytest.mark.slow),
-    ],
+    sampled(
+        [
+            (ExactCoulomb(mu_s=0.5, mu_d=MU), 20.0, 500.0),
+            (ExactCoulomb(mu_s=MU, mu_d=MU), 20.0, 200.0),
+            (ExactCoulomb(mu_s=MU, mu_d=MU), 20.0, 500.0),
+            (ExactCoulomb(mu_s=MU, mu_d=MU), 200.0, 500.0),
+            (BrownMcPhee(mu_s=MU, mu_d=MU, v_t=1e-3), 20.0, 500.0),
+        ],
+        of=5,
+    ),
 )
 def test_a_brake_stops_a_wheel_at_least_cost(law: Law, speed: float, most: float) -> None:
     m = Mechanism("wheel")
