@@ -315,13 +315,14 @@ def _by_homotopy(search: Search, friction: Friction, guess: Start, starts: int |
             raise
         smooth = check(search.direct(guess, starts=starts))
         return with_sentence(smooth, f"Friction was not sharpened: {reason_of(error)}.")
-    tried, text = list[Judged](), f"No motion by modes was sought: {reason}." if reason else ""
+    tried, ended = list[Judged](), False
+    text = f"No motion by modes was sought: {reason}." if reason else ""
     while sharp.solution.ok:
         if friction != "modes" and sharp.level <= own_level(problem, sharp.scales) * 1.001:
             smooth = search.direct(sharp.solution, sharp.solution.meshes)
             return check(_after(sharp.solution, smooth))
         early = sharp.level <= EARLY and not sharp.steady
-        if not reason and (sharp.rivals or early or sharp.level <= LAST * 1.001):
+        if not reason and (sharp.rivals or early or ended or sharp.level <= LAST * 1.001):
             try:
                 tried.append(search.near(sharp))
                 last = tried[-1]  # narrower layers would not change a motion that is exact
@@ -329,11 +330,14 @@ def _by_homotopy(search: Search, friction: Friction, guess: Start, starts: int |
                     return tried[-1].solution
             except FAILURES as error:
                 text = f"Modes were not found: {reason_of(error)}."
+        if ended:
+            break
         try:
             sharp, before = next(path, sharp), sharp
         except FAILURES as error:
             text, before = f"{text} Friction was not sharpened further: {reason_of(error)}.", sharp
-        if sharp is before:
+        ended = sharp is before
+        if ended and (tried or reason):
             break
     if any(one.solution.ok or one.solution.status in FOUND for one in tried):
         best = max(tried, key=lambda one: (one.right, one.solution.ok, -one.solution.cost))

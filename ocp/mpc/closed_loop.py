@@ -23,7 +23,7 @@ from ocp.mpc.session import Action, Session
 from symfric.foundation import checks
 from symfric.foundation.files import write_table
 from symfric.foundation.numeric import evaluate_all
-from symfric.foundation.panels import panels, save
+from symfric.foundation.panels import legend_below, panels, save
 from symfric.foundation.shown import brief
 from symfric.foundation.style import line
 from symfric.integrator.stepper import stepper
@@ -259,10 +259,7 @@ def plot_loops(
     axes[-1].set_ylabel("cycle [ms]")
     axes[-1].set_xlabel("t [s]")
     if len(loops) > 1:
-        entries = axes[0].get_legend_handles_labels()
-        figure.legend(
-            *entries, loc="outside lower center", fontsize="small", ncols=4, frameon=False
-        )
+        legend_below(figure, axes[0], 4, fontsize="small")
     else:
         axes[0].set_title(next(iter(loops)))
     figure.align_ylabels(axes)

@@ -13,7 +13,7 @@ from symfric.codegen import Block, generate, inverse_dynamics_block, law_block, 
 from symfric.embedded import CORES, Absent, Tools, find_tools, measure, wrong_on_target
 from symfric.embedded.measure import REGIMES
 from symfric.laws import GMS, BrownMcPhee, Element, LuGre, MaxwellSlip, VelocityBased
-from symfric.scenes import Arm, drive, rabinowicz
+from symfric.scenes import Arm, rabinowicz
 
 TEN = tuple(Element(5e4 * 2.0**-i, 0.1) for i in range(10))
 """Ten elements, each with a tenth of the friction, and stiffnesses over three decades."""
@@ -72,18 +72,14 @@ CONTROLLERS = (
 
 def controllers(quick: bool, tools: Tools) -> Iterator[Found]:
     """Measure a controller with one and with up to 20 quadratic programs in a cycle."""
-    from ocp import Phase, Problem, at_end, effort, track  # noqa: PLC0415  (slow to import)
-    from ocp.mpc.target import measure_controller  # noqa: PLC0415
+    from ocp.mpc.target import measure_controller  # noqa: PLC0415  (slow to import)
+    from symfric.bench.ocp import STEP, receding  # noqa: PLC0415  (slow to import)
 
-    model = drive(BrownMcPhee(mu_s=6.0, mu_d=4.0, v_t=1e-2), m=1.0, N=1.0)
-    cost = track("x", "goal", 900.0) + track("v", 0.0, 1.0) + effort("force", 1e-3)
-    cost += at_end(lambda s: 100 * (s.x - s.goal) ** 2 + s.v**2)
-    bounds = {"force": (-20.0, 20.0)}
-    problem = Problem(Phase(model, T=0.2), cost, bounds=bounds, p={"goal": 0.0})
+    problem = receding(BrownMcPhee(mu_s=6.0, mu_d=4.0, v_t=1e-2))
     for core, real in (("m4f", "float"), ("m7", "double")):
         for programs in (1, 20):
             with TemporaryDirectory(prefix="symfric-") as folder:
-                made = problem.to_mpc(0.01, iterations=programs).to_c(folder, real)
+                made = problem.to_mpc(STEP, iterations=programs).to_c(folder, real)
                 cycles = CYCLES // 10 if quick else CYCLES
                 m = measure_controller(made, core, cycles=cycles, tools=tools)
             yield CONTROLLERS, {

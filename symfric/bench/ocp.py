@@ -102,14 +102,12 @@ PLANTS: dict[str, Callable[[], Law]] = {
 }
 
 
-def receding() -> Problem:
+def receding(law: Law) -> Problem:
     """Return the problem of a drive that moves to a position and stays, with 20 steps of 10 ms."""
     cost = track("x", "goal", 900.0) + track("v", 0.0, 1.0) + effort("force", 1e-3)
     cost += at_end(lambda s: 100.0 * (s.x - s.goal) ** 2 + s.v**2)
-    stage = _drive(guide(1e-2))
-    return Problem(
-        Phase(stage, T=STEP * HORIZON), cost, bounds={"force": (-20.0, 20.0)}, p={"goal": 0.0}
-    )
+    bounds = {"force": (-20.0, 20.0)}
+    return Problem(Phase(_drive(law), T=STEP * HORIZON), cost, bounds=bounds, p={"goal": 0.0})
 
 
 def controllers(cycles: int = CYCLES) -> Iterator[Found]:
@@ -117,7 +115,7 @@ def controllers(cycles: int = CYCLES) -> Iterator[Found]:
 
     Unreported failures are cycles that report convergence although they did not converge.
     """
-    controller = receding().to_mpc(step=STEP)
+    controller = receding(guide(1e-2)).to_mpc(step=STEP)
 
     def goal(times: Array) -> Array:
         """Return `GOAL` in every other second, and 0 otherwise."""

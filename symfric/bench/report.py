@@ -235,7 +235,7 @@ def curves(panel: str, lines: Sequence[str], x: str, *ys: str) -> Draw:
 def _draw_curves(
     panel: str, lines: Sequence[str], x: str, ys: Sequence[str], rows: Sequence[Row]
 ) -> "Figure":
-    from symfric.foundation.panels import grid  # noqa: PLC0415  (slow to import)
+    from symfric.foundation.panels import grid, legend_below  # noqa: PLC0415  (slow to import)
     from symfric.foundation.style import COLOURS, MARKERS, colour  # noqa: PLC0415  (slow to import)
 
     def label(row: Row) -> str:
@@ -280,10 +280,7 @@ def _draw_curves(
         axis.set_ylabel(y)
         axis.tick_params(which="both", labelsize="small")
         axis.xaxis.set_minor_formatter("")
-    figure.legend(
-        *axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=4,
-        fontsize="small",
-    )  # fmt: skip
+    legend_below(figure, axes[0], 4, fontsize="small", frameon=True)
     return figure
 
 

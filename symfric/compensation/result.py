@@ -309,7 +309,7 @@ class Comparison:
             names: cases to show, by default all.
             path: image file.
         """
-        from symfric.foundation.panels import panels, save  # noqa: PLC0415  (slow to import)
+        from symfric.foundation.panels import legend_below, panels, save  # noqa: PLC0415  (slow to import)
 
         checks.check_names("comparison", names, self.loops)
         shown = [self.loops[n] for n in names or self.loops]
@@ -334,10 +334,7 @@ class Comparison:
             axis.sharex(axes[0])
         axes[4].set_title("at a reversal" if self.reference.rest is None else "at rest", fontsize=9)
         axes[4].set_xlabel("t [s]")
-        entries = axes[0].get_legend_handles_labels()
-        figure.legend(
-            *entries, loc="outside lower center", fontsize="small", ncols=4, frameon=False
-        )
+        legend_below(figure, axes[0], 4, fontsize="small")
         axes[0].set_title(f"plant '{self.plant}'")
         figure.align_ylabels(axes)
         return save(figure, path)

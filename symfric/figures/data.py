@@ -111,7 +111,7 @@ class FigureData(Showing):
         Colours distinguish laws and line styles distinguish cases; with a single law both
         distinguish its cases.
         """
-        from symfric.foundation.panels import panels, save  # noqa: PLC0415  (slow to import)
+        from symfric.foundation.panels import legend_below, panels, save  # noqa: PLC0415  (slow to import)
 
         laws = list(dict.fromkeys(c.law for c in self.curves))
         abscissae = {x for x, _ in self.panels}
@@ -127,8 +127,7 @@ class FigureData(Showing):
         if note := "; ".join(text for text in (self.note, omitted) if text):
             axes[0].set_title("\n".join(textwrap.wrap(note, 100)), loc="left", fontsize="small")
         if len(drawn) > 1:
-            entries = axes[0].get_legend_handles_labels()
-            figure.legend(*entries, loc="outside lower center", ncols=3, fontsize="small")
+            legend_below(figure, axes[0], fontsize="small", frameon=True)
         figure.align_ylabels(axes)
         return save(figure, path)
 

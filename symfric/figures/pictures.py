@@ -16,7 +16,7 @@ from symfric.figures.data import Array, Curve, FigureData, draw_curves, phenomen
 from symfric.figures.motion import Scales, scales
 from symfric.figures.pushing import stiction
 from symfric.figures.sliding import dwell, hysteresis, lag, transition, velocity_step
-from symfric.foundation.panels import blank, dressed, grid, save
+from symfric.foundation.panels import blank, dressed, grid, legend_below, save
 from symfric.foundation.parameters import parameters
 from symfric.foundation.status import SolveError
 from symfric.foundation.style import colour, dash, line
@@ -137,8 +137,7 @@ def plot_laws(laws: Mapping[str, AnyLaw], N: float = 1.0, path: str | Path | Non
         f"{', '.join(laws)}   N = {N:g} N{''.join(inputs)}", x=0.01, ha="left", fontsize="large"
     )
     if len(laws) > 1:
-        entries = near.get_legend_handles_labels()
-        figure.legend(*entries, loc="outside lower center", ncols=4, fontsize="small")
+        legend_below(figure, near, 4, fontsize="small", frameon=True)
     return save(figure, path)
 
 

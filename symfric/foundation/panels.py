@@ -113,6 +113,12 @@ def dressed(axis: Axes) -> Axes:
     return axis
 
 
+def legend_below(figure: Figure, axis: Axes, ncols: int = 3, **look: Any) -> None:
+    """Draw the legend of one panel below all panels; `look` are arguments of `Figure.legend`."""
+    entries = axis.get_legend_handles_labels()
+    figure.legend(*entries, loc="outside lower center", ncols=ncols, **{"frameon": False} | look)
+
+
 def save(figure: Figure, path: str | Path | None, dpi: float = 150) -> Figure:
     """Write `figure` to `path` unless it is None, and return the figure."""
     if path is not None:

@@ -10,8 +10,6 @@ from typing import Any, final
 
 import numpy as np
 from matplotlib import colormaps
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from symfric import Trajectory
 from symfric.foundation.numeric import Array
@@ -49,12 +47,6 @@ REFERENCE: Mapping[str, Any] = {"color": QUIET, "linewidth": 3.2, "solid_capstyl
 def shade(part: float) -> Any:
     """Return the colour of a parameter value, from the first (0, violet) to the last (1, green)."""
     return colormaps["viridis"](0.9 * part)
-
-
-def legend_below(figure: Figure, axis: Axes, ncols: int = 3) -> None:
-    """Draw the legend of one panel below all panels."""
-    entries = axis.get_legend_handles_labels()
-    figure.legend(*entries, loc="outside lower center", ncols=ncols, frameon=False)
 
 
 LOOKS = {

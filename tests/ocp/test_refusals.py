@@ -82,8 +82,6 @@ def by_modes(**options: Any) -> object:
 OPEN, BACK = Phase(MODEL, Free(0.1, 3.0)), Phase(MODEL, 1.0, name="back")
 BAD_END, STARTED = Phase(MODEL, 1.0, end={"y": 1.0}), Phase(drive(LuGre()), 1.0, start={"v": FREE})
 OPENED = Phase(slider_crank(), 0.5, start={"crank": 1.0, "slider": 0.9})
-
-
 DRY = drive(ExactCoulomb(mu_s=0.3, mu_d=0.2))
 
 
@@ -106,25 +104,16 @@ def run_of(t: list[float], **signals: list[float]) -> Any:
 
 def test_bad_input_is_refused(capfd: pytest.CaptureFixture[str]) -> None:
     functions = (
-        *(
-            by_modes,
-            chosen,
-            clash,
-            controller,
-            estimated,
-            guessed,
-            implicit,
-            initial_points,
-            make_meshes,
-        ),
-        *(moved, on, positioning, replace, run_of, scenarios, short, solve_once, stage),
-        *(there_and_back, two, unit_move, with_stop),
+        *(by_modes, chosen, clash, controller, estimated, guessed, implicit, initial_points),
+        *(make_meshes, moved, on, positioning, replace, run_of, scenarios, short, solve_once),
+        *(stage, there_and_back, two, unit_move, with_stop),
     )
-    names = {function.__name__: function for function in functions}
-    names |= {"math": math, "FORCE": integral(lambda s: s.force**2), "DRY": DRY, "BACK": BACK}
-    names |= {"BAD_END": BAD_END, "MODEL": MODEL, "OPEN": OPEN, "OPENED": OPENED}
-    row = np.zeros(5)
-    names |= {"EFFORT": EFFORT, "STARTED": STARTED, "ROW": row, "SEEN": {"x": row, "a": row}}
+    row, force = np.zeros(5), integral(lambda s: s.force**2)
+    names = {function.__name__: function for function in functions} | {
+        "BACK": BACK, "BAD_END": BAD_END, "DRY": DRY, "EFFORT": EFFORT, "FORCE": force,
+        "MODEL": MODEL, "OPEN": OPEN, "OPENED": OPENED, "ROW": row, "SEEN": {"x": row, "a": row},
+        "STARTED": STARTED, "math": math,
+    }  # fmt: skip
     table = Path(__file__).with_name("refusals.toml")
     assert not_refused(table, symfric, ocp, **names) == []
     capfd.readouterr()  # texts of solvers

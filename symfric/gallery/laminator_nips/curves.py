@@ -7,11 +7,10 @@ from scipy.optimize import root_scalar
 
 from symfric import LuGre, simulate
 from symfric.foundation.numeric import Array
-from symfric.foundation.panels import NARROW, panels
+from symfric.foundation.panels import NARROW, legend_below, panels
 from symfric.foundation.style import line
 from symfric.gallery.laminator_nips.studies import PRINTED, curve
 from symfric.gallery.plate import Drawn, plate
-from symfric.gallery.shared import legend_below
 from symfric.scenes import Prescribed
 
 EXPONENTS = (2 / 3, 8 / 9, 26 / 27)

@@ -13,11 +13,11 @@ from scipy.optimize import root_scalar
 
 from symfric import BrownMcPhee, Law, SelfTuning, Trajectory, simulate, symbolise
 from symfric.foundation.numeric import Array
-from symfric.foundation.panels import grid, panels
+from symfric.foundation.panels import grid, legend_below, panels
 from symfric.foundation.style import line
 from symfric.gallery.plate import Drawn, plate
 from symfric.gallery.self_tuning import both_laws
-from symfric.gallery.shared import REFERENCE, Belt, largest, legend_below, rms
+from symfric.gallery.shared import REFERENCE, Belt, largest, rms
 from symfric.scenes import Rabinowicz
 
 MU = {"mu_s": 0.15, "mu_d": 0.1}

@@ -9,12 +9,12 @@ import numpy as np
 
 from symfric import BrownMcPhee
 from symfric.foundation.numeric import Array
-from symfric.foundation.panels import panels
+from symfric.foundation.panels import legend_below, panels
 from symfric.foundation.style import line
 from symfric.gallery.plate import Drawn, plate
 from symfric.gallery.self_tuning import both_laws, machines
 from symfric.gallery.self_tuning.both_laws import LAWS, Both
-from symfric.gallery.shared import REFERENCE, largest, legend_below
+from symfric.gallery.shared import REFERENCE, largest
 from symfric.scenes import SliderCrank
 
 MU = {"mu_s": 0.1, "mu_d": 0.08}

@@ -10,13 +10,13 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from symfric.foundation.numeric import Array
-from symfric.foundation.panels import grid, panels
+from symfric.foundation.panels import grid, legend_below, panels
 from symfric.foundation.style import QUIET, colour, line
 from symfric.gallery.plate import Drawn, plate
 from symfric.gallery.self_tuning import both_laws, machines
 from symfric.gallery.self_tuning.both_laws import LAWS, TUNED, Both, Signals
 from symfric.gallery.self_tuning.machines import fastest, fixed_steps
-from symfric.gallery.shared import REFERENCE, largest, legend_below
+from symfric.gallery.shared import REFERENCE, largest
 from symfric.scenes import FourMass
 
 MU = {"mu_s": 0.12, "mu_d": 0.1}

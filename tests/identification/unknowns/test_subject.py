@@ -4,7 +4,6 @@ import pickle
 
 import numpy as np
 import pytest
-from tables import sampled
 
 from identification.unknowns.spec import Unknown, above, linear, log, tied
 from identification.unknowns.subject import Subject, subject
@@ -27,13 +26,13 @@ def named(what: object, **given: object) -> dict[str, Unknown]:
     return {u.name: u for u in subject(what, **given).unknowns}  # pyright: ignore
 
 
-@pytest.mark.parametrize("name", sampled(sorted(ALL_LAWS.keys() - NEED_MORE), of=4))
+@pytest.mark.parametrize("name", sorted(ALL_LAWS.keys() - NEED_MORE))
 def test_every_point_of_the_box_is_a_law_that_can_be_constructed(name: str) -> None:
     found = subject(ALL_LAWS[name](), v_max=0.15)
     at = coordinates(found)
     rng = np.random.default_rng(0)
     refused = 0
-    for _ in range(6):
+    for _ in range(2):
         w = np.clip(at.start + 2 * rng.standard_normal(at.start.size), at.lower, at.upper)
         try:
             assert found.close(at.named(w)).law is not None

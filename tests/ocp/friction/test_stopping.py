@@ -4,9 +4,10 @@ from math import sqrt
 
 import numpy as np
 import pytest
+from tables import sampled
 
 from ocp import Free, Phase, Problem, integral, solve
-from symfric import BrownMcPhee, ExactCoulomb, Law
+from symfric import BrownMcPhee, ExactCoulomb, Law, drive
 from symfric.multibody import DiscClutch, Mechanism, Revolute
 
 MU, INERTIA, RADIUS = 0.35, 0.1, 0.15
@@ -14,13 +15,16 @@ MU, INERTIA, RADIUS = 0.35, 0.1, 0.15
 
 @pytest.mark.parametrize(
     ("law", "speed", "most"),
-    [
-        (ExactCoulomb(mu_s=0.5, mu_d=MU), 20.0, 500.0),
-        (ExactCoulomb(mu_s=MU, mu_d=MU), 20.0, 200.0),
-        pytest.param(ExactCoulomb(mu_s=MU, mu_d=MU), 20.0, 500.0, marks=pytest.mark.slow),
-        pytest.param(ExactCoulomb(mu_s=MU, mu_d=MU), 200.0, 500.0, marks=pytest.mark.slow),
-        pytest.param(BrownMcPhee(mu_s=MU, mu_d=MU, v_t=1e-3), 20.0, 500.0, marks=pytest.mark.slow),
-    ],
+    sampled(
+        [
+            (ExactCoulomb(mu_s=0.5, mu_d=MU), 20.0, 500.0),
+            (ExactCoulomb(mu_s=MU, mu_d=MU), 20.0, 200.0),
+            (ExactCoulomb(mu_s=MU, mu_d=MU), 20.0, 500.0),
+            (ExactCoulomb(mu_s=MU, mu_d=MU), 200.0, 500.0),
+            (BrownMcPhee(mu_s=MU, mu_d=MU, v_t=1e-3), 20.0, 500.0),
+        ],
+        of=5,
+    ),
 )
 def test_a_brake_stops_a_wheel_at_least_cost(law: Law, speed: float, most: float) -> None:
     m = Mechanism("wheel")
@@ -40,3 +44,14 @@ def test_a_brake_stops_a_wheel_at_least_cost(law: Law, speed: float, most: float
     assert pytest.approx(T, rel=1e-5) == found.T
     if isinstance(law, ExactCoulomb):
         assert np.all(found["brake_mode"] == 1.0)
+
+
+def test_a_block_that_coasts_to_rest_arrives_when_friction_stops_it() -> None:
+    phase = Phase(
+        drive(ExactCoulomb(mu_s=0.15, mu_d=0.1)), Free(0.1, 20.0), start={"x": 0.0, "v": 1.0},
+        end={"v": 0.0}, bounds={"force": (0.0, 0.0)},
+    )  # fmt: skip
+    found = solve(Problem(phase, integral(lambda s: 1.0)))
+    arrival = 1 / (0.1 * 9.81)
+    assert found.verified and found.cost == pytest.approx(arrival, rel=1e-7)
+    assert [mode.kind for mode in found.modes["guide"]] == ["slip+"]

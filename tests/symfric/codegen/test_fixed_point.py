@@ -1,7 +1,10 @@
 """C in fixed point: errors within the proven bounds, functions over all arguments, refusals."""
 
+from contextlib import suppress
 from math import nan
+from operator import add, mul, sub
 from pathlib import Path
+from random import Random
 from string import Template
 
 import casadi as ca
@@ -95,6 +98,39 @@ def formula(expression, out: Path) -> FixedPoint:
 @pytest.mark.parametrize("name", FORMULAS)
 def test_integers_do_not_overflow(name, compiler, tmp_path):
     agrees(formula(FORMULAS[name], tmp_path), compiler, 3000)
+
+
+ONE = (
+    ca.tanh, ca.atan, ca.fabs, ca.sign, lambda a: ca.exp(-ca.fabs(a)),
+    lambda a: ca.sqrt(ca.fabs(a)), lambda a: ca.log(ca.fabs(a) + 0.1),
+    lambda a: (ca.fabs(a) + 0.1) ** 1.7,
+)  # fmt: skip
+TWO = (
+    add, add, sub, mul, mul, ca.fmin, ca.fmax, lambda a, b: a / (ca.fabs(b) + 0.1),
+    lambda a, b: ca.if_else(a < b, a, b * b), lambda a, b: ca.if_else(a > 0.25, b, a),
+)  # fmt: skip
+
+
+def some(random: Random, leaves: list[ca.SX], depth: int) -> ca.SX:
+    """Return a random formula."""
+    if depth == 0:
+        return random.choice([*leaves, ca.SX(round(10.0 ** random.uniform(-3.0, 3.0), 3))])
+    operation = random.choice([*ONE, *TWO])
+    count = 1 if operation in ONE else 2
+    return operation(*(some(random, leaves, depth - 1) for _ in range(count)))
+
+
+@pytest.mark.parametrize("count", [4, pytest.param(100, marks=pytest.mark.slow)])
+def test_no_random_formula_exceeds_its_bound(count, compiler, tmp_path):
+    """Formulas whose bound is refused do not count."""
+    random, found = Random(1), 0
+    while found < count:
+        with suppress(ValueError):
+            made = formula(lambda x, y: some(random, [x, y], random.randint(2, 5)), tmp_path)
+            errors, warnings = compare(made, compiler, random_inputs(made, 3000))
+            assert not warnings
+            assert errors["F"] <= made.errors["F"]
+            found += 1
 
 
 def test_states_are_clamped_to_their_ranges(compiler, tmp_path):

@@ -32,7 +32,6 @@ SCENES = {
     "loops": SliderCrank(ExactCoulomb()),
 }
 UNITS = table(__file__, "units")
-heavy = pytest.mark.heavy
 
 
 @pytest.fixture

@@ -95,13 +95,6 @@ def test_smooth_form_tends_to_the_exact_one_with_the_sharpness() -> None:
     assert errors[2] < 1e-3
 
 
-def test_force_depends_on_the_path_alone() -> None:
-    points = [0.0, 3e-5, -1e-5, 1e-5, -1e-5, 2.5e-5]
-    for law in (LAW, EXACT):
-        slow, fast = (at_points(moved(law, points, s), points) for s in (1.0, 20.0))
-        assert fast == pytest.approx(slow, abs=1e-6)
-
-
 def test_loop_takes_the_closed_form_work() -> None:
     A = 4e-5
     points = [0.0, A, -A, A, -A, A]

@@ -123,20 +123,6 @@ def test_a_new_joint_is_a_class_and_nothing_else() -> None:
     assert kinds(m.build())["pin_slide"] == "position"
 
 
-def test_distance_measures_from_point_to_point() -> None:
-    made = mb.Distance("rod", "a", "b", length=5.0)
-    for z, expected in ((0.0, 0.0), (1.0, 0.5)):
-        assert float(ca.DM(made.constraints(ca.SX.eye(3), ca.SX([3.0, 4.0, z])))) == expected
-
-
-def test_a_joint_starts_at_its_given_position_or_without_displacement() -> None:
-    for kind, start, expected in (
-        (mb.Revolute, 0.3, (0.3,)), (mb.Revolute, None, (0,)), (mb.Cylindrical, (1.0, 2.0), (1, 2)),
-        (mb.Spherical, None, (1, 0, 0, 0)), (mb.Floating, None, (0, 0, 0, 1, 0, 0, 0)),
-    ):  # fmt: skip
-        assert kind("j", "a", "b", start=start).starts == expected
-
-
 def full(expression: ca.SX) -> np.ndarray:
     return ca.DM(expression).full()
 

@@ -20,7 +20,6 @@ from symfric.integrator.equations.expressions import (
     changes,
     divided_once,
     levels,
-    lifted,
     pieces,
     tanh,
 )
@@ -79,49 +78,6 @@ def test_divisors_that_are_constant_or_repeated_are_inverted_once() -> None:
     before, after = (ca.Function("f", [t, X], [f]) for f in (plain, divided_once(plain)))
     assert [operations(f).count(ca.OP_DIV) for f in (before, after)] == [4, 2]
     assert after(0.7, 1.3).full() == pytest.approx(before(0.7, 1.3).full(), rel=1e-15)
-
-
-EXPRESSIONS: dict[str, ca.SX] = {
-    "sine": 3.7 * ca.sin(2.3 * t + 0.1),
-    "twice": 2 * t + (t + t),
-    "powers": t**2 + t**2.5 + 1.7**t + (t + 0.3) ** -3,
-    "choice": ca.if_else(t > 0.4, ca.sin(3 * t), 5 - X),
-    "steps": ca.pw_const(t, [0.2, 0.4], [1.5, -2, 5]),
-    "bounded": ca.fmin(ca.fmax(3 * t, -0.7), 0.9) / 3 + ca.atan2(t, 3),
-    "number": ca.SX(5.5),
-    "nothing": ca.sin(t) * t - X,
-    "infinite": ca.fmin(t, ca.inf),
-    "feedback": 3 * (1 - X) + ca.floor(4 * t) + ca.fmod(t, 0.3),
-}
-
-
-def test_numbers_as_data_give_the_same_bits() -> None:
-    known = ca.vertcat(t, X)
-    for name, expression in EXPRESSIONS.items():
-        made, symbols, numbers = lifted(expression, known, "u")
-        assert symbols.numel() == numbers.size
-        before = ca.Function("b", [known], [expression])
-        after = ca.Function("a", [known, symbols], [made])
-        for at in np.random.default_rng(0).uniform(0.0, 1.0, (20, 2)):
-            assert float(after(at, numbers)) == float(before(at)), name
-
-
-def test_exponents_are_structure_and_coincidences_are_none(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Twice the same number, 2 (which CasADi writes as a sum) and negative ones."""
-    made, _, numbers = lifted(3 * t**2.5, t, "u")
-    assert numbers.tolist() == [3.0]
-    assert not ca.jacobian(made, t).is_constant()
-    assert lifted(ca.sin(t) + t**2, t, "u")[2].size == 0
-    structures = set[str]()
-    for a, b, c in ((1.5, 3.0, 0.2), (3.0, 3.0, 3.0), (2.0, 2.0, -7.0)):
-        made, _, numbers = lifted(a * ca.sin(b * t + c), t, "u")
-        structures.add(ca.SX.serialize(made))
-        assert sorted(numbers) == sorted([a, b, c])
-    assert len(structures) == 1
-    monkeypatch.setattr(expressions, "MOST_NUMBERS", 3)
-    table = 3 * ca.sin(4 * t) + 5 * ca.cos(6 * t)
-    made, symbols, numbers = lifted(table, t, "u")
-    assert (made is table, symbols.shape, numbers.size) == (True, (0, 1), 0)
 
 
 def test_amplitudes_are_one_integrator_and_one_call_of_the_compiler(
