@@ -323,11 +323,15 @@ def _direction(point: Point, linear: Covariance, name: str) -> Array:
 
 
 def bend(task: Task, point: Point, step: Array) -> float:
-    """Return the deviation of the residuals from their linear change, relative to this change."""
-    box = task.unknowns
-    step = np.clip(point.w + step, box.lower, box.upper) - point.w
-    there, change = task.at(point.w + step), point.J @ step
-    if isinstance(there, str):
+    """Return the deviation of the residuals from their linear change, relative to this change.
+
+    It is infinite if a logarithmic value leaves its range, in which the data show it.
+    """
+    box, end = task.unknowns, point.w + step
+    inside = np.clip(end, box.lower, box.upper)
+    there, change = task.at(inside), point.J @ (inside - point.w)
+    leaves = [u.logarithmic and a != b for u, a, b in zip(box.unknowns, end, inside, strict=True)]
+    if any(leaves) or isinstance(there, str):
         return np.inf
     bent = float(np.linalg.norm(there.evaluation.r / task.sigma - point.r - change))
     return bent / max(float(np.linalg.norm(change)), 1e-300)

@@ -16,7 +16,9 @@ from identification.fit import Fit
 from identification.residuals.inverse import InverseDynamics
 from identification.residuals.points import Points
 from identification.residuals.shooting import Shooting
+from identification.solving.task import Point
 from identification.unknowns.spec import above, log, tied
+from identification.verdict.covariance import bend
 from symfric import Model, Variable, contact, simulate
 from symfric.foundation.status import SolveError, Status
 from symfric.laws import Coulomb, Dahl, Stribeck, Sum, Viscous
@@ -210,3 +212,13 @@ def test_intervals_of_simulated_records_contain_the_truth(
         assert found.low is not None and found.high is not None
         assert found.low <= value <= found.high
         assert found.value == pytest.approx(value, rel=0.01)
+
+
+def test_an_interval_beyond_the_range_of_a_scale_is_not_linear() -> None:
+    made = Fit(Points(), "stribeck", points()).prepared()
+    point = made.task.at(made.centre)
+    assert isinstance(point, Point)
+    names = made.task.unknowns.fitted
+    for name, leaves in {"v_s": True, "sigma_2": False}.items():
+        step = 20.0 * (np.array(names) == name)  # a factor of e^20 of a velocity
+        assert np.isinf(bend(made.task, point, step)) == leaves
