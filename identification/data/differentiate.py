@@ -86,7 +86,7 @@ class Velocity:
 
         V = V_x + W (V_v - V_x),   W = E_x / (E_x + E_v),   E = W^2 E_v + (1 - W)^2 E_x
 
-    With W averaged over 1/500 of the band or 99 frequencies, this has almost the least noise of
+    With W averaged over 1/250 of the band or 99 frequencies, this has almost the least noise of
     all unbiased combinations. E_x is white noise of the position after the difference of fourth
     order, with the gain s instead of w, plus the bias of this difference:
 

@@ -29,7 +29,7 @@ LOST = 0.01
 """Largest share of noise in the acceleration of the used band."""
 DIFFERENCE = (1.0, -2.0, 1.0)
 """Coefficients of the second difference."""
-FEW, WIDE = 9, 1e-3
+FEW, WIDE = 19, 2e-3
 """Least number and share of entries for the mean of a spectrum, to separate motion from noise."""
 
 

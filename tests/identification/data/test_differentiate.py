@@ -98,6 +98,13 @@ def test_the_motion_ends_where_its_noise_begins() -> None:
     assert position_band(x + 1e-1 * noise, 1e-3) < 5.0
 
 
+def test_peaks_of_noise_do_not_widen_the_band() -> None:
+    t = np.arange(6000) * 2e-3
+    for seed in range(40):
+        noise = np.random.default_rng(seed).standard_normal(t.size)
+        assert position_band(np.sin(2 * np.pi * t) + 1e-4 * noise, 2e-3) < 30.0
+
+
 def test_noise_of_the_position_narrows_the_filter() -> None:
     t = np.arange(20_000) * 1e-3
     noise = np.random.default_rng(0).standard_normal(t.size)
