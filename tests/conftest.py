@@ -51,7 +51,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 def pytest_collection_finish() -> None:
     gc.freeze()
-    gc.set_threshold(20_000)  # looks for garbage took a tenth of the time of the tests
+    gc.set_threshold(20_000)  # tests make little garbage
     gc.enable()
 
 

@@ -16,7 +16,6 @@ from symfric.laws.composed.populations import GenericAsperity, Population, Rando
 
 N = 10.0
 STIFFNESS, LIMITS = [5e4, 2.5e4, 1.5e4, 1e4], [0.25] * 4
-LAW = MaxwellSlip(n=100.0)
 EXACT = MaxwellSlip(form="event")
 
 
