@@ -325,7 +325,7 @@ def _direction(point: Point, linear: Covariance, name: str) -> Array:
 def bend(task: Task, point: Point, step: Array) -> float:
     """Return the deviation of the residuals from their linear change, relative to this change.
 
-    It is infinite if a logarithmic value leaves its range, in which the data show it.
+    It is infinite if the step takes a logarithmic value out of its range.
     """
     box, end = task.unknowns, point.w + step
     inside = np.clip(end, box.lower, box.upper)
