@@ -111,7 +111,8 @@ def simulate(
         t_end: last time [s].
         t_start: first time [s].
         x0: start values of states by name; the other states start at the model's defaults (those
-            of bristles are steady sliding).
+            of bristles are steady sliding, those of modes the direction of sliding). A given mode
+            must agree with the sliding velocity.
         u: inputs by name: a number, `Hold` or `Linear` samples, or a function of symbolic time. A
             function is sampled at 8193 times and within its jumps to detect short pulses; list in
             `times` the pulses that lie between two samples and have no jump.
