@@ -259,13 +259,15 @@ class _Path:
         return tuple(found)
 
     def first(self, coarse: Sequence[HomotopyStep], intervals: int) -> HomotopyStep:
-        """Return the best of several coarse solves, solved again on the finer mesh."""
+        """Return the best of several coarse solves, solved again on the finer mesh if possible."""
         if coarse[0].ended:
             return coarse[0]
         fine = self.discretisation.on(_meshes(self.problem, intervals))
         step = least(self.each(fine, [self.moved(one, fine) for one in coarse], ONTO))
         if not step.good and not step.ended:
             step = least(self.each(fine, [self.moved(coarse[0], fine)], LATER | {"max_iter": 300}))
+        if not step.good and not step.ended and coarse[0].good:
+            return self.with_errors(coarse[0])
         now = self.scales_at(step)
         self.scales = now if same_size(now, self.scales, SAME) else self.scales
         return self.refined(step, np.inf) if step.good else step
