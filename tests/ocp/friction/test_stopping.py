@@ -14,19 +14,20 @@ MU, INERTIA, RADIUS = 0.35, 0.1, 0.15
 
 
 @pytest.mark.parametrize(
-    ("law", "speed", "most"),
+    ("law", "speed", "most", "k"),
     sampled(
         [
-            (ExactCoulomb(mu_s=0.5, mu_d=MU), 20.0, 500.0),
-            (ExactCoulomb(mu_s=MU, mu_d=MU), 20.0, 200.0),
-            (ExactCoulomb(mu_s=MU, mu_d=MU), 20.0, 500.0),
-            (ExactCoulomb(mu_s=MU, mu_d=MU), 200.0, 500.0),
-            (BrownMcPhee(mu_s=MU, mu_d=MU, v_t=1e-3), 20.0, 500.0),
+            (ExactCoulomb(mu_s=0.5, mu_d=MU), 20.0, 500.0, 1e-5),
+            (ExactCoulomb(mu_s=MU, mu_d=MU), 20.0, 200.0, 1e-5),
+            (ExactCoulomb(mu_s=MU, mu_d=MU), 20.0, 500.0, 1e-5),
+            (ExactCoulomb(mu_s=MU, mu_d=MU), 200.0, 500.0, 1e-5),
+            (ExactCoulomb(mu_s=MU, mu_d=MU), 2.0, 50.0, 1e-3),
+            (BrownMcPhee(mu_s=MU, mu_d=MU, v_t=1e-3), 20.0, 500.0, 1e-5),
         ],
-        of=5,
+        of=6,
     ),
 )
-def test_a_brake_stops_a_wheel_at_least_cost(law: Law, speed: float, most: float) -> None:
+def test_a_brake_stops_a_wheel_at_least_cost(law: Law, speed: float, most: float, k: float) -> None:
     m = Mechanism("wheel")
     m.body("wheel", mass=5.0, inertia=(INERTIA, INERTIA, INERTIA))
     m.joint(Revolute("shaft", "ground", "wheel"))
@@ -36,11 +37,11 @@ def test_a_brake_stops_a_wheel_at_least_cost(law: Law, speed: float, most: float
         m.build(), Free(0.01, 50.0), start={"shaft": 0.0, "shaft_rate": speed},
         end={"shaft_rate": 0.0}, bounds={"pedal": (0.0, most)},
     )  # fmt: skip
-    found = solve(Problem(phase, integral(lambda s: 1 + 1e-5 * s.pedal**2)))
+    found = solve(Problem(phase, integral(lambda s: 1 + k * s.pedal**2)))
     # the cost per angular momentum, (1 + k P^2) / (mu r P), is least at P = 1 / sqrt(k)
-    force = min(most, 1 / sqrt(1e-5))
+    force = min(most, 1 / sqrt(k))
     T = speed * INERTIA / (MU * RADIUS * force)
-    assert found.verified and found.cost == pytest.approx(T * (1 + 1e-5 * force**2), rel=1e-6)
+    assert found.verified and found.cost == pytest.approx(T * (1 + k * force**2), rel=1e-6)
     assert pytest.approx(T, rel=1e-5) == found.T
     if isinstance(law, ExactCoulomb):
         assert np.all(found["brake_mode"] == 1.0)
