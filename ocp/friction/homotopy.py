@@ -75,8 +75,9 @@ TOLERANCE = 1e-3
 """Permitted local error of an interval, relative to the magnitude of the states."""
 PASSES = 4
 """Largest number of meshes at one width."""
-FURTHER = 2
-"""Number of repetitions with new starts around straight lines if no start leads to a solution."""
+FURTHER, THINNER = 2, 0.1
+"""Number of repetitions with new starts around straight lines if no start leads to a solution, and
+factor of the widths in the last one."""
 DEARER = 0.5
 """Relative excess of the cost at which layers are too wide, as where only friction stops a body."""
 SAME = 3.0
@@ -205,6 +206,9 @@ class _Path:
             if best.ended or best.good:
                 break
             seeds = range(more * starts, (more + 1) * starts)
+            if more == FURTHER:  # where only friction stops a body, wide layers have no motion
+                thin = {n: s._replace(speed=THINNER * s.speed) for n, s in self.scales.items()}
+                self.scales = thin
             steps += self.each(coarse, starts_around(coarse, straight, seeds))
             best = least(steps)
         if best.ended:
