@@ -105,7 +105,7 @@ def test_interruption_of_starts_keeps_the_best() -> None:
 
 @pytest.mark.slow
 def test_solutions_by_modes_are_resumed(tmp_path: Path) -> None:
-    """From a neighbouring problem, the optimum of six starts is reached without any of them."""
+    """From a neighbouring problem, the optimum of six starts or a better one needs none of them."""
 
     def move(m: float = 1.0, T: float = 1.4, mu_d: float = 4.0) -> Problem:
         stage = drive(BrownMcPhee(mu_s=6.0, mu_d=mu_d, mu_v=0.5, v_t=1e-5), m=m, N=1.0)
@@ -119,7 +119,7 @@ def test_solutions_by_modes_are_resumed(tmp_path: Path) -> None:
         seen: list[Progress] = []
         cold, warm = solve(problem), solve(problem, guess=guess, progress=seen.append)
         assert warm.verified
-        np.testing.assert_allclose(warm.cost, cold.cost, rtol=1e-4)
+        assert warm.cost <= cold.cost * (1 + 1e-4)
         assert not any(now.stage.startswith("start") for now in seen)
 
 

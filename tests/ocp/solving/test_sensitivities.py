@@ -106,7 +106,7 @@ def test_sensitivities_pass_through_stick() -> None:
     The reference are solves of the program of the arcs with changed parameters.
     """
     phase = guided(1.5, to=0.2).chain[0]
-    found = solve(Problem(phase, integral(lambda s: (1 + s.t / 2) * s.force**2)), starts=2)
+    found = solve(Problem(phase, integral(lambda s: (1 + s.t / 2) * s.force**2)), starts=3)
     assert [mode.kind for mode in found.modes["guide"]] == ["slip+", "stick"]
     optimum = found.optimum
     assert optimum is not None
