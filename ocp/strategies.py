@@ -337,7 +337,7 @@ def _by_homotopy(search: Search, friction: Friction, guess: Start, starts: int |
         except FAILURES as error:
             text, before = f"{text} Friction was not sharpened further: {reason_of(error)}.", sharp
         ended = sharp is before
-        if ended and (tried or reason):
+        if ended and (tried or reason):  # otherwise modes are sought once, from the last motion
             break
     if any(one.solution.ok or one.solution.status in FOUND for one in tried):
         best = max(tried, key=lambda one: (one.right, one.solution.ok, -one.solution.cost))

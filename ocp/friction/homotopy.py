@@ -207,8 +207,9 @@ class _Path:
                 break
             seeds = range(more * starts, (more + 1) * starts)
             if more == FURTHER:  # where only friction stops a body, wide layers have no motion
-                thin = {n: s._replace(speed=THINNER * s.speed) for n, s in self.scales.items()}
-                self.scales = thin
+                self.scales = {
+                    n: s._replace(speed=THINNER * s.speed) for n, s in self.scales.items()
+                }
             steps += self.each(coarse, starts_around(coarse, straight, seeds))
             best = least(steps)
         if best.ended:
@@ -216,9 +217,8 @@ class _Path:
         before, self.scales = self.scales, self.scales_at(best)
         if not same_size(self.scales, before, SAME):
             again = self.each(coarse, [best.points, *tries])
-            dearer = DEARER * abs(best.outcome.cost)
-            wide = least(again)
-            if wide.ended or (wide.good and wide.outcome.cost <= best.outcome.cost + dearer):
+            wide, limit = least(again), best.outcome.cost + DEARER * abs(best.outcome.cost)
+            if wide.ended or (wide.good and wide.outcome.cost <= limit):
                 steps = again
             else:  # the change of the widths is too large
                 self.scales = before

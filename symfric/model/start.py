@@ -155,27 +155,35 @@ class System:
             c.states[0].name: c for c in self.contacts if [s.name for s in c.law.states] == ["mode"]
         }
 
+    @cached_property
+    def _slips(self) -> ca.Function:
+        """Function (x, z, u, p, t) -> sliding velocities of `modes`, and their slopes by x."""
+        slips, x = stacked(c.slip for c in self.modes.values()), self.vector("x")
+        groups = [self.vector(letter) for letter in "xzup"]
+        every = [ca.densify(slips), ca.densify(ca.jacobian(slips, x))]
+        return ca.Function("slips", [*groups, self.t], every)
+
     def _check_modes(self, given: Mapping[str, Any], x: Any, u: Any, p: Any, t: Any) -> None:
         """Refuse a given mode that contradicts the sliding velocity; columns are members.
 
         Raises:
             ValueError: a contact sticks while it slides, or slides in the other direction.
         """
-        names, nominal = [v.name for v in self.x], self.nominal("x")
-        for name in self.modes.keys() & given.keys():
-            slip, z = ca.SX(self.modes[name].slip), np.array([[float(v.start)] for v in self.z])
-            every = [self.vector(letter) for letter in "xzup"]
-            of = ca.Function("slip", [*every, self.t], [slip, ca.jacobian(slip, every[0])])
-            count = x.shape[1]
-            v, slopes = of.map(count)(x, np.tile(z, count), u, p, np.broadcast_to(t, (1, count)))
-            least = SLOW * float(np.abs(slopes.full()[0] * np.tile(nominal, count)).max())
-            modes, speeds = np.round(x[names.index(name)]), v.full()[0]
-            wrong = np.where(modes == 0, np.abs(speeds), -modes * speeds) > least
+        count, z = x.shape[1], np.array([[float(v.start)] for v in self.z]).reshape(-1, 1)
+        times = np.broadcast_to(t, (1, count))
+        found = self._slips(x, np.tile(z, count), u, p, times)
+        speeds, slopes = (np.array(one) for one in found)
+        least = SLOW * np.abs(slopes).reshape(len(speeds), count, -1) @ self.nominal("x")
+        for i, name in enumerate(self.modes):
+            if name not in given:
+                continue
+            modes = np.round(x[self._names["x"][name]])
+            wrong = np.where(modes == 0, np.abs(speeds[i]), -modes * speeds[i]) > least[i]
             if wrong.any():
                 k = int(wrong.argmax())
                 raise ValueError(
                     f"{self.name}.{name}: expected 0 in stick, else the direction of sliding, got "
-                    f"{modes[k]:g} at a sliding velocity of {speeds[k]:g}; leave it out of x0"
+                    f"{modes[k]:g} at a sliding velocity of {speeds[i, k]:g}; leave it out of x0"
                 )
 
     def start_slopes(

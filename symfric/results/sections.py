@@ -197,7 +197,7 @@ def cycle(run: Signals, section: ca.SX | None, tolerance: float) -> Cycle:
         section = columns[i] - (values[i].max() + values[i].min()) / 2
     times = crossings(partial(run.of, section), looks, 1)
     if times.size < RETURNS + 1:
-        hint = _steady(run, column) or (
+        hint = _steady(run, column, nominal) or (
             "simulate longer, or give an expression that the motion crosses"
         )
         raise ValueError(
@@ -215,19 +215,19 @@ def cycle(run: Signals, section: ca.SX | None, tolerance: float) -> Cycle:
     raise ValueError(
         f"{where}: expected a motion that repeats to {tolerance:g} of its range, got one that "
         f"differs by {off:.2g} between crossings; "
-        + (_steady(run, column) or "simulate longer, or raise the tolerance")
+        + (_steady(run, column, nominal) or "simulate longer, or raise the tolerance")
     )
 
 
-def _steady(run: Signals, column: ca.SX) -> str:
+def _steady(run: Signals, column: ca.SX, nominal: Array) -> str:
     """Return a hint for a run that has settled to a steady motion; empty for any other run."""
     looks = run.looks
     last = looks[looks >= (looks[0] + 3 * looks[-1]) / 4]
     whole, left = (np.ptp(np.atleast_2d(run.of(column, at)), axis=1) for at in (looks, last))
-    share = float((left / np.maximum(whole, 1e-300)).max())
+    share = float((left / np.maximum(whole, FLAT * nominal)).max())
     if not share < SETTLED:
         return ""
     return (
-        f"in the last quarter the states vary by only {share:.1g} of their range, so the run has "
-        "settled to a steady motion: use equilibrium(), or --from equilibrium"
+        f"in the last quarter the states vary by only {share:.1g} of their range, so the run "
+        "seems to have settled to a steady motion: use equilibrium(), or --from equilibrium"
     )
